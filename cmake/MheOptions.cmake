@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+# Options of the build and the flags of our own targets.
+option(MHE_BUILD_TESTS "Build the tests" ON)
+option(MHE_WERROR "Warnings are errors (presets dev and sanitizers)" OFF)
+option(MHE_FUZZ "Build the fuzz targets (clang with libFuzzer)" OFF)
+set(MHE_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
+
+set(MHE_PLUGIN_ABI_DIR mhe/plugins/abi0)
+set(MHE_PLUGIN_BUILD_DIR ${CMAKE_BINARY_DIR}/plugins)
+
+# Flags of everything compiled here; interface only, never installed.
+add_library(mhe_flags INTERFACE)
+target_compile_definitions(mhe_flags INTERFACE _POSIX_C_SOURCE=200809L)
+target_compile_options(mhe_flags INTERFACE
+    -Wall -Wextra -Wpedantic -Wconversion -Wshadow -Wvla
+    $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
+    $<$<BOOL:${MHE_WERROR}>:-Werror>)
+if(MHE_SANITIZE)
+    target_compile_options(mhe_flags INTERFACE -fsanitize=${MHE_SANITIZE} -fno-omit-frame-pointer)
+    target_link_options(mhe_flags INTERFACE -fsanitize=${MHE_SANITIZE})
+    if(MHE_SANITIZE MATCHES "undefined")
+        target_compile_options(mhe_flags INTERFACE -fno-sanitize-recover=undefined)
+    endif()
+endif()
+if(MHE_FUZZ)
+    target_compile_options(mhe_flags INTERFACE -fsanitize=fuzzer-no-link)
+endif()
+
+find_package(PkgConfig REQUIRED)
+
+set_property(GLOBAL PROPERTY MHE_PLUGINS_BUILT "")
+set_property(GLOBAL PROPERTY MHE_PLUGINS_SKIPPED "")
+
+function(mhe_print_summary)
+    get_property(built GLOBAL PROPERTY MHE_PLUGINS_BUILT)
+    get_property(skipped GLOBAL PROPERTY MHE_PLUGINS_SKIPPED)
+    message(STATUS "mhe ${PROJECT_VERSION}, ${CMAKE_BUILD_TYPE}")
+    message(STATUS "  plugins: ${built}")
+    foreach(line IN LISTS skipped)
+        message(STATUS "  skipped: ${line}")
+    endforeach()
+endfunction()

@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+# mhe_test(<name> LABEL <unit|abi|conformance|numeric|regress|install> SOURCES <files> [LIBRARIES <targets>])
+#
+# One cmocka executable, one process, one ctest entry. Exit status 77 is "skipped" (reference data absent). Tests see
+# the build tree's plugins and never a user's.
+find_package(cmocka QUIET)
+if(NOT cmocka_FOUND)
+    pkg_check_modules(CMOCKA REQUIRED IMPORTED_TARGET cmocka)
+endif()
+
+function(mhe_test_environment test)
+    set_tests_properties(${test} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 ENVIRONMENT
+        "MHE_PLUGIN_PATH=${MHE_PLUGIN_BUILD_DIR};OMP_NUM_THREADS=1;OPENBLAS_NUM_THREADS=1;ASAN_OPTIONS=detect_leaks=1;LSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/cmake/lsan.supp;TSAN_OPTIONS=suppressions=${CMAKE_SOURCE_DIR}/cmake/tsan.supp")
+endfunction()
+
+function(mhe_test name)
+    if(NOT MHE_BUILD_TESTS)
+        return()
+    endif()
+    cmake_parse_arguments(arg "" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
+    add_executable(test_${name} ${arg_SOURCES})
+    target_link_libraries(test_${name} PRIVATE mhe_test_support mhe_core mhe_flags ${arg_LIBRARIES})
+    target_compile_definitions(test_${name} PRIVATE
+        MHE_TEST_SOURCE_DIR="${CMAKE_SOURCE_DIR}" MHE_TEST_BINARY_DIR="${CMAKE_BINARY_DIR}"
+        MHE_TEST_PLUGIN_DIR="${MHE_PLUGIN_BUILD_DIR}")
+    set_target_properties(test_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+    add_test(NAME ${name} COMMAND test_${name})
+    set_tests_properties(${name} PROPERTIES LABELS ${arg_LABEL})
+    mhe_test_environment(${name})
+endfunction()

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* cost.h: interface of cost plugins (kind "cost").
+ *
+ * A cost reads named signals y of the model at one node and returns residuals r(y) and dr/dy. The
+ * core owns the chain rule from signals to states and controls, the sum over nodes and the options
+ * common to all costs:
+ *
+ *     objective = sum over nodes k of  c_k * weight / sigma^2 * 1/2 |r_k|^2,   c_k = interval
+ * length (s), last node 1
+ *
+ * Signals (unit; what a target of the same name is compared with):
+ *   markers (m)  positions in ground [3 n_markers]      activation (1)   excitation (1,
+ * excitation-driven only) q, qdot (rad, rad/s or m, m/s)                      muscle_force (N)
+ *   joint_moment (N m) by the muscles, -L_q^T F [n_q]   residual_torque (N m, only when switched
+ * on) [n_q]
+ *
+ * Missing data: a missing sample is NaN in `y_ref`; a signal that has no value at a node (controls
+ * at the last node) is NaN in `y`. A residual must let NaN through; the core then drops its row and
+ * its Jacobian's. */
+#ifndef MHE_COST_H
+#define MHE_COST_H
+
+#include <mhe/plugin.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define MHE_COST_IFACE "mhe.cost/1"
+#define MHE_COST_MAX_SIGNALS 16
+
+#define MHE_FORMULATION_EXCITATION 0 /* muscle controls are excitations; activations are states */
+#define MHE_FORMULATION_ACTIVATION 1 /* muscle controls are activations */
+
+/* What a cost may ask about the problem while it is set up. Lives until after destroy(). */
+typedef struct mhe_problem mhe_problem;
+struct mhe_problem {
+    uint32_t size;
+    int32_t formulation; /* MHE_FORMULATION_* */
+    int32_t n_q, n_muscles, n_markers;
+    int32_t n_residual_torques; /* 0 or n_q */
+    int32_t n_intervals;
+    double interval; /* s */
+    const char *const *coordinate_names;
+    const char *const *muscle_names;
+    const char *const *marker_names;
+    void *data; /* the core's own */
+    /* Number of a signal (>= 0), its size and unit (both may be NULL); -1 if this problem has none
+     * of that name. [any]
+     */
+    int32_t (*find_signal)(const mhe_problem *problem, const char *name, int32_t *n_y,
+                           const char **unit);
+};
+
+#define MHE_JACOBIAN_DENSE 0 /* J [n_res x ny], row-major */
+#define MHE_JACOBIAN_DIAGONAL \
+    1 /* n_res = ny and r_i depends on y_i alone: J [ny] is the diagonal */
+
+/* Filled by layout(); zeroed before. */
+typedef struct mhe_cost_layout {
+    uint32_t size;
+    int32_t signal;    /* the one signal read, where n_signals is left 0 */
+    int32_t n_signals; /* several: y is their concatenation in this order; repeats are fine */
+    int32_t signals[MHE_COST_MAX_SIGNALS];
+    int32_t n_res;          /* number of residuals */
+    int32_t jacobian;       /* MHE_JACOBIAN_* */
+    uint32_t scratch_bytes; /* wanted in stage->scratch */
+    const char *res_unit;   /* unit of r, "1" if mixed */
+} mhe_cost_layout;
+
+/* One node as a cost sees it. All arrays are lent for the call. */
+typedef struct mhe_stage {
+    uint32_t size;
+    int32_t node, n_intervals; /* 0 .. n_intervals; the last node has no controls */
+    int32_t ny;
+    double time;         /* s */
+    const double *y;     /* [ny] */
+    const double *y_ref; /* [ny], NaN where no target is known */
+    void *scratch;       /* [scratch_bytes], 64-byte aligned, this thread's own */
+} mhe_stage;
+
+typedef struct mhe_cost_ops { /* required: layout, residual */
+    uint32_t size;
+    /* NULL: `self` is the config itself. [cold] */
+    mhe_status (*create)(const mhe_host *host, const mhe_problem *problem, const void *config,
+                         void **self, mhe_error *err);
+    void (*destroy)(void *self); /* NULL where create is. [cold] */
+    mhe_status (*layout)(const void *self, const mhe_problem *problem, mhe_cost_layout *out,
+                         mhe_error *err); /* [cold] */
+    /* r [n_res]. MHE_RETRY: no value at this point. [hot] */
+    mhe_status (*residual)(const void *self, const mhe_stage *stage, double *r, mhe_error *err);
+    /* dr/dy in the shape that layout() chose, zeroed by the core before the call. NULL: the core
+     * takes central differences and says so in the log. [hot] */
+    mhe_status (*jacobian)(const void *self, const mhe_stage *stage, double *J, mhe_error *err);
+} mhe_cost_ops;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

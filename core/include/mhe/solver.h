@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* solver.h: interface of solver plugins (kind "solver").
+ *
+ * A solver sees a stage-structured least-squares problem and knows no muscles:
+ *
+ *     minimise   sum_{k=0}^{N-1} l_k(x_k, u_k) + l_N(x_N)        (each l_k half a weighted sum of
+ * squares) subject to x_{k+1} = F_k(x_k, u_k),   x_lower_k <= x_k <= x_upper_k,   u_lower_k <= u_k
+ * <= u_upper_k
+ *
+ * A variable is fixed where its bounds are equal (the first state of a moving horizon). Lagrangian
+ * and signs: L = sum l_k + sum_k lambda_k^T (x_{k+1} - F_k(x_k, u_k)) - z_lower^T (w - lower) -
+ * z_upper^T (upper - w),  z >= 0
+ */
+#ifndef MHE_SOLVER_H
+#define MHE_SOLVER_H
+
+#include <mhe/plugin.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define MHE_SOLVER_IFACE "mhe.solver/1"
+
+/* What evaluate() is to compute at node k; NULL: not wanted. Matrices row-major. At the last node u
+ * is NULL and the entries for u and the dynamics are not touched. */
+typedef struct mhe_stage_values {
+    uint32_t size;
+    double *cost;    /* [1] l_k */
+    double *grad_x;  /* [n_x] */
+    double *grad_u;  /* [n_u] */
+    double *hess_xx; /* Gauss-Newton, [n_x x n_x] */
+    double *hess_ux; /* [n_u x n_x] */
+    double *hess_uu; /* [n_u x n_u] */
+    double *x_next;  /* [n_x] F_k(x_k, u_k) */
+    double *A;       /* dF/dx [n_x x n_x] */
+    double *B;       /* dF/du [n_x x n_u] */
+} mhe_stage_values;
+
+typedef struct mhe_stage_problem mhe_stage_problem;
+struct mhe_stage_problem {
+    uint32_t size;
+    int32_t n_intervals; /* N >= 1 */
+    int32_t n_x, n_u;
+    int32_t n_workers; /* evaluate() may run at the same time for workers 0 .. n_workers-1 */
+    /* Bounds [(N+1) x n_x] and [N x n_u], +-infinity allowed; read anew at every solve. */
+    const double *x_lower, *x_upper, *u_lower, *u_upper;
+    /* Structure: 1 where an entry can be non-zero at any node. A [n_x x n_x], B [n_x x n_u],
+     * Gauss-Newton Hessian [n_x x n_x], [n_u x n_x], [n_u x n_u]; the same at all nodes. */
+    const uint8_t *A_pattern, *B_pattern, *xx_pattern, *ux_pattern, *uu_pattern;
+    void *data; /* the core's own */
+    /* Values at node k (0..N) for (x [n_x], u [n_u], NULL at N). MHE_RETRY: no value here, shorten
+     * the step. [hot] */
+    mhe_status (*evaluate)(const mhe_stage_problem *problem, int32_t worker, int32_t k,
+                           const double *x, const double *u, const mhe_stage_values *out,
+                           mhe_error *err);
+};
+
+/* Iterate, in: start, out: result. All arrays the caller's. */
+typedef struct mhe_solution {
+    uint32_t size;
+    int32_t has_multipliers;     /* in: lambda and z below are a start too; out: 1 */
+    double *x;                   /* [(N+1) x n_x] */
+    double *u;                   /* [N x n_u] */
+    double *lambda;              /* [N x n_x], of x_{k+1} - F_k = 0 */
+    double *zx_lower, *zx_upper; /* [(N+1) x n_x], >= 0 */
+    double *zu_lower, *zu_upper; /* [N x n_u], >= 0 */
+} mhe_solution;
+
+#define MHE_SOLVE_CONVERGED 0
+#define MHE_SOLVE_ITERATION_LIMIT 1
+#define MHE_SOLVE_INFEASIBLE 2
+#define MHE_SOLVE_FAILED 3 /* no progress, non-finite values; the iterate is the last good one */
+#define MHE_SOLVE_DEADLINE 4
+#define MHE_SOLVE_INTERRUPTED 5
+
+/* Limits of one solve. */
+typedef struct mhe_solve_control {
+    uint32_t size;
+    double deadline; /* s of CLOCK_MONOTONIC at which to stop with the best iterate; 0: none */
+    void *data;      /* for progress */
+    /* Called after each iteration; non-zero stops with MHE_SOLVE_INTERRUPTED. May be NULL. */
+    int32_t (*progress)(void *data, int32_t iteration, double objective, double kkt_residual);
+} mhe_solve_control;
+
+typedef struct mhe_solve_info {
+    uint32_t size;
+    int32_t outcome; /* MHE_SOLVE_*: a result, not an error */
+    int32_t iterations;
+    double objective;
+    double
+        kkt_residual; /* largest violation of the optimality conditions as the solver scales them */
+    double primal_residual; /* largest |x_{k+1} - F_k| */
+    double evaluation_time; /* s spent in evaluate() */
+} mhe_solve_info;
+
+typedef struct mhe_solver_ops {
+    uint32_t size;
+    /* `problem` lives until after destroy(); its sizes and patterns do not change. [cold] */
+    mhe_status (*create)(const mhe_host *host, const mhe_stage_problem *problem, const void *config,
+                         void **self, mhe_error *err);
+    void (*destroy)(void *self); /* [cold] */
+    /* Negative status only where nothing could be computed at all; a poor result is told by
+     * info->outcome. `control` may be NULL. [cold] */
+    mhe_status (*solve)(void *self, const mhe_solve_control *control, mhe_solution *solution,
+                        mhe_solve_info *info, mhe_error *err);
+} mhe_solver_ops;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

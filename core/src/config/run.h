@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* run.h: the typed description of a run, read from one YAML file. */
+#ifndef MHI_RUN_H
+#define MHI_RUN_H
+
+#include "base/arena.h"
+#include "base/text.h"
+#include "config/tree.h"
+#include "plugin/registry.h"
+
+#include <mhe/cost.h>
+#include <mhe/option.h>
+
+/* A plugin as the config uses it. `config` is filled and checked. */
+typedef struct mhi_use {
+    const mhe_plugin *plugin;
+    const void *config;   /* plugin->config_size bytes */
+    const mhi_node *node; /* for messages */
+    double weight, sigma; /* costs only: common options */
+} mhi_use;
+
+#define MHI_UNSUPPORTED_STOP 0
+#define MHI_UNSUPPORTED_WARN 1
+
+/* Sections of the file, each filled from an option table of its own (run.c). Paths are absolute or
+ * NULL. */
+typedef struct mhi_model_section {
+    const char *file;
+    int32_t unsupported; /* MHI_UNSUPPORTED_* */
+} mhi_model_section;
+
+typedef struct mhi_data_section {
+    const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
+    int32_t emg_delay; /* samples by which the tracked EMG lags: activation-driven default 2,
+                        * excitation-driven 0 (-1 in the file = by formulation) */
+} mhi_data_section;
+
+typedef struct mhi_initial_section {
+    mhe_real_list q, qdot; /* n = 0: from the reference, else free within bounds */
+    double tolerance;      /* half width of the bounds of the first state, rad, rad/s */
+} mhi_initial_section;
+
+typedef struct mhi_horizon_section {
+    int32_t window; /* intervals, N */
+    int32_t ratio;  /* every ratio-th frame is used */
+} mhi_horizon_section;
+
+typedef struct mhi_bounds_section {
+    int32_t residual_torques;   /* 0: none; 1: one per coordinate */
+    double residual_torque_max; /* N m */
+    double velocity_max;        /* rad/s */
+    double activation_min, activation_max, excitation_min, excitation_max;
+} mhi_bounds_section;
+
+typedef struct mhi_output_section {
+    int32_t picture; /* draw estimated against reference with gnuplot, where it is installed */
+} mhi_output_section;
+
+typedef struct mhi_run {
+    const char *path; /* of the config file */
+    const char *dir;  /* its folder */
+    const char *name; /* its base name without extension */
+    mhi_use model, muscle, integrator, solver;
+    mhi_use *costs;
+    int32_t n_costs;
+    int32_t formulation; /* MHE_FORMULATION_* */
+    mhi_model_section model_file;
+    mhi_data_section data;
+    mhi_initial_section initial;
+    mhi_horizon_section horizon;
+    mhi_bounds_section bounds;
+    mhi_output_section output;
+    mhi_tree *tree;
+    mhi_arena arena; /* all of the above */
+} mhi_run;
+
+/* Reads and checks a config with `set` [n_set] assignments applied. Finds every plugin it names in
+ * `registry` (the file's plugin_path is searched first, if given). MHE_E_CONFIG, MHE_E_INPUT,
+ * MHE_E_PLUGIN: one line, "file:line: ...". Files of the data section are not opened. [cold] */
+mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
+                        mhi_registry *registry, mhi_run **run, mhe_error *err);
+void mhi_run_free(mhi_run *run);
+
+/* The resolved configuration: every key of every section and plugin with its value, YAML that reads
+ * back the same. */
+void mhi_run_write(const mhi_run *run, mhi_text *out);
+
+#endif

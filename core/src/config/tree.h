@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tree.h: a YAML file as a tree whose every node knows its line. */
+#ifndef MHI_TREE_H
+#define MHI_TREE_H
+
+#include "base/text.h"
+
+#include <mhe/abi.h>
+
+#define MHI_SCALAR 0
+#define MHI_SEQUENCE 1
+#define MHI_MAPPING 2
+
+typedef struct mhi_node {
+    int32_t kind;           /* MHI_SCALAR ... */
+    int32_t line;           /* 1-based; 0: set on the command line */
+    int32_t quoted;         /* scalar in quotes: always text */
+    int32_t used;           /* for callers that report unused keys */
+    const char *key;        /* in a mapping; else NULL */
+    const char *text;       /* scalar; else NULL */
+    struct mhi_node *first; /* children in the file's order */
+    struct mhi_node *next;
+} mhi_node;
+
+typedef struct mhi_tree mhi_tree; /* owns all nodes and texts */
+
+/* Reads a file, or a text that is called `name` in messages. MHE_E_INPUT: unreadable, not YAML,
+ * duplicate key, aliases that would grow without end; the message starts with "file:line: ". [cold]
+ */
+mhe_status mhi_tree_read(const char *path, mhi_tree **tree, mhe_error *err);
+mhe_status mhi_tree_parse(const char *name, const char *text, size_t length, mhi_tree **tree,
+                          mhe_error *err);
+void mhi_tree_free(mhi_tree *tree);
+
+mhi_node *mhi_tree_root(const mhi_tree *tree);   /* never NULL: an empty file is an empty mapping */
+const char *mhi_tree_path(const mhi_tree *tree); /* for messages */
+/* "--set a.b.2.c=value": replaces or adds; the value is parsed as YAML; list entries by number. */
+mhe_status mhi_tree_set(mhi_tree *tree, const char *assignment, mhe_error *err);
+
+mhi_node *mhi_node_find(const mhi_node *mapping, const char *key); /* NULL if absent */
+int32_t mhi_node_count(const mhi_node *node);                      /* number of children */
+
+/* Fails with "file:line: " (or "--set: ") in front of the message. */
+MHE_PRINTF(5, 6)
+mhe_status mhi_fail_at(mhe_error *err, mhe_status code, const mhi_tree *tree, const mhi_node *node,
+                       const char *format, ...);
+
+#endif

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* model_file.h: reads a model file into a description. */
+#ifndef MHI_MODEL_FILE_H
+#define MHI_MODEL_FILE_H
+
+#include <mhe/description.h>
+
+/* Reads .osim (OpenSim 2.x to 4.x XML) or .bioMod (biorbd, versions 1 to 4), told apart by content,
+ * then by name. The description owns all its memory; give it back with mhi_description_free.
+ * Elements that it cannot say are listed in ->unsupported; the caller decides. MHE_E_INPUT:
+ * "file:line: what is wrong". [cold] */
+mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_error *err);
+
+/* The same from memory, for fuzzing and tests; `name` is used in messages. */
+mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
+                          mhe_description **description, mhe_error *err);
+mhe_status mhi_biomod_parse(const char *name, const char *text, size_t length,
+                            mhe_description **description, mhe_error *err);
+void mhi_description_free(mhe_description *description);
+
+#endif

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* table.h: time series: .sto/.mot tables and .trc marker trajectories. */
+#ifndef MHI_TABLE_H
+#define MHI_TABLE_H
+
+#include <mhe/abi.h>
+
+/* Rows of numbers under labels, time first. Missing values are NaN. Owned by whoever read it. */
+typedef struct mhi_table {
+    char *path;                /* for messages */
+    int32_t n_rows, n_columns; /* columns without time */
+    char **labels;             /* [n_columns] */
+    double *time;              /* [n_rows], s, strictly increasing, finite */
+    double *values;     /* [n_rows x n_columns], row-major; as in the file, angles and lengths not
+                           converted ... */
+    int32_t in_degrees; /* ... the .sto header says inDegrees=yes */
+    double rate;        /* Hz: from the header or the median step */
+    double unit;        /* .trc: metres per unit of the file (already applied to values); else 1 */
+    char unit_name[8];  /* .trc: "mm", "cm", "m" */
+    char **warnings;    /* what was repaired or skipped: one line each with file:line */
+    int32_t n_warnings;
+} mhi_table;
+
+/* Reads .sto or .mot (any header the OpenSim or SIMM readers take; tabs, or blanks or commas where
+ * the row is made of them). MHE_E_INPUT: "file:line: what": unreadable, no data, a cell that is no
+ * number, a wrong number of columns, time not a number or not increasing, a label twice. [cold] */
+mhe_status mhi_sto_read(const char *path, mhi_table **table, mhe_error *err);
+/* Reads .trc. Values become metres, 3 columns per marker; labels [n_columns / 3] are marker names
+ * (n_columns counts coordinates). Empty cells and NaN in any spelling are missing. [cold] */
+mhe_status mhi_trc_read(const char *path, mhi_table **table, mhe_error *err);
+/* The same from memory. */
+mhe_status mhi_sto_parse(const char *name, const char *text, size_t length, mhi_table **table,
+                         mhe_error *err);
+mhe_status mhi_trc_parse(const char *name, const char *text, size_t length, mhi_table **table,
+                         mhe_error *err);
+void mhi_table_free(mhi_table *table);
+
+#endif

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* registry.h: which plugins there are. */
+#ifndef MHI_REGISTRY_H
+#define MHI_REGISTRY_H
+
+#include "base/text.h"
+
+#include <mhe/plugin.h>
+
+typedef struct mhi_registry mhi_registry;
+
+/* An empty registry that already knows its standard folders: MHE_PLUGIN_PATH (':' between folders),
+ * the installed <libdir>/mhe/plugins/abi0, the build tree's plugin folder. They are scanned at the
+ * first look-up. `host` is lent for life. [cold] */
+mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mhe_error *err);
+void mhi_registry_free(mhi_registry *registry); /* libraries stay loaded until exit */
+
+/* Adds a folder to be searched before the standard ones. May be called again; a folder twice is
+ * once. */
+mhe_status mhi_registry_add_folder(mhi_registry *registry, const char *folder, mhe_error *err);
+
+/* The plugin with this id whose interface is `iface` (NULL: any). MHE_E_PLUGIN: none; the message
+ * gives the nearest id and says which files were refused and why. */
+mhe_status mhi_registry_find(mhi_registry *registry, const char *id, const char *iface,
+                             const mhe_plugin **plugin, mhe_error *err);
+
+/* All plugins, sorted by id. */
+int32_t mhi_registry_count(mhi_registry *registry);
+const mhe_plugin *mhi_registry_at(mhi_registry *registry, int32_t i);
+const char *mhi_registry_file(mhi_registry *registry, int32_t i); /* shared object it came from */
+
+/* Refused files: "path: reason". */
+int32_t mhi_registry_refused_count(mhi_registry *registry);
+const char *mhi_registry_refused(mhi_registry *registry, int32_t i);
+
+#define MHI_FORMAT_TEXT 0
+#define MHI_FORMAT_JSON 1
+#define MHI_FORMAT_MARKDOWN 2
+/* What --list-plugins and --describe print. */
+void mhi_registry_list(mhi_registry *registry, int32_t format, mhi_text *out);
+mhe_status mhi_registry_describe(mhi_registry *registry, const char *id, int32_t format,
+                                 mhi_text *out, mhe_error *err);
+
+#endif
