@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* ocp.h: direct multiple shooting: system + integrator + costs over N intervals, as the stage
+ * problem solvers see.
+ *
+ *     minimise   sum_k c_k sum_terms weight / sigma^2 * 1/2 |r(y(x_k, u_k))|^2    c_k = interval
+ * length (s), last node 1 subject to x_{k+1} = F(x_k, u_k; interval length), bounds
+ *
+ * The window of the estimator is one of these whose targets and bounds move; a whole motion is one
+ * with many intervals. */
+#ifndef MHI_OCP_H
+#define MHI_OCP_H
+
+#include "ocp/term.h"
+
+#include <mhe/integrator.h>
+#include <mhe/solver.h>
+
+typedef struct mhi_ocp_setup {
+    const mhe_host *host;
+    const mhi_system *system;
+    const mhe_plugin *integrator;
+    const void *integrator_config;
+    const mhi_term_setup *terms;
+    int32_t n_terms;
+    int32_t n_intervals;
+    double interval;   /* s */
+    int32_t n_workers; /* threads that may evaluate at the same time, >= 1 */
+} mhi_ocp_setup;
+
+typedef struct mhi_ocp mhi_ocp;
+
+mhe_status mhi_ocp_create(const mhi_ocp_setup *setup, mhi_ocp **ocp, mhe_error *err);
+void mhi_ocp_free(mhi_ocp *ocp);
+
+const mhe_stage_problem *mhi_ocp_face(const mhi_ocp *ocp); /* what a solver sees */
+const mhe_problem *mhi_ocp_problem(const mhi_ocp *ocp);    /* what a cost sees */
+const mhi_signals *mhi_ocp_signals(const mhi_ocp *ocp);
+
+/* Arrays that the owner of the problem may write between solves, at node k. */
+double *mhi_ocp_x_lower(mhi_ocp *ocp, int32_t k); /* [n_x] */
+double *mhi_ocp_x_upper(mhi_ocp *ocp, int32_t k);
+double *mhi_ocp_u_lower(mhi_ocp *ocp, int32_t k); /* [n_u] */
+double *mhi_ocp_u_upper(mhi_ocp *ocp, int32_t k);
+/* Target of a signal (MHI_SIGNAL_*) at node k: [n_y of the signal], NaN where none is known (as at
+ * the start); NULL where the problem has no such signal. */
+double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
+void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time); /* s, told to costs */
+
+/* x_next = F(x, u) by worker 0. */
+mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
+                           mhe_error *err);
+/* The system context of worker 0, for kinematics outside a solve. */
+mhi_system_context *mhi_ocp_context(mhi_ocp *ocp);
+
+#endif

@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ocp/signals.h"
+
+#include <math.h>
+#include <string.h>
+
+void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
+    const mhe_system *f = mhi_system_face(system);
+    const int32_t n_k = mhi_system_description(system)->n_markers;
+    const int32_t n_q = f->n_q, n_m = f->n_m, driven = f->n_a > 0; /* by excitations */
+    const int32_t all = 2 * n_q + n_m; /* [q v a] is contiguous in z either way */
+    *signals = (mhi_signals){
+        .signal = {
+            [MHI_SIGNAL_MARKERS] = {"markers", "m", 3 * n_k, 0, 0, n_q, 0, 0},
+            [MHI_SIGNAL_Q] = {"q", "rad", n_q, 0, 0, 0, 0, 0},
+            [MHI_SIGNAL_QDOT] = {"qdot", "rad/s", n_q, 0, n_q, 0, 0, 0},
+            [MHI_SIGNAL_ACTIVATION] = {"activation", "1", n_m, 0, 2 * n_q, 0, !driven, 0},
+            [MHI_SIGNAL_EXCITATION] = {"excitation", "1", driven ? n_m : 0, 0, f->n_x, 0, 1, 0},
+            [MHI_SIGNAL_MUSCLE_FORCE] = {"muscle_force", "N", n_m, 0, 0, all, !driven, 0},
+            [MHI_SIGNAL_JOINT_MOMENT] = {"joint_moment", "N m", n_q, 0, 0, all, !driven, 0},
+            [MHI_SIGNAL_RESIDUAL_TORQUE] = {"residual_torque", "N m", f->n_r, 0, f->n_x + n_m, 0, 1,
+                                            0},
+        }};
+    for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
+        mhi_signal *s = &signals->signal[i];
+        s->offset = signals->n_y;
+        s->jacobian = signals->n_jacobian;
+        signals->n_y += s->n_y;
+        signals->n_jacobian += s->n_y * s->n_columns;
+    }
+}
+
+static void fill_nan(double *y, int32_t n) {
+    for (int32_t i = 0; i < n; i++) {
+        y[i] = NAN;
+    }
+}
+
+/* dF/d[q v a] = [F_q F_v diag(F_a)] and d moment/d[q v a] = [moment_q moment_v -L_q^T diag(F_a)] */
+static void muscle_blocks(const mhi_muscle_state *s, int32_t n_q, int32_t n_m, double *force,
+                          double *moment) {
+    const int32_t n = 2 * n_q + n_m;
+    const size_t row = sizeof(double) * (size_t)n_q;
+    if (force != NULL) {
+        memset(force, 0, sizeof(double) * (size_t)(n_m * n));
+        for (int32_t m = 0; m < n_m; m++) {
+            memcpy(force + m * n, s->force_q + m * n_q, row);
+            memcpy(force + m * n + n_q, s->force_v + m * n_q, row);
+            force[m * n + 2 * n_q + m] = s->force_a[m];
+        }
+    }
+    if (moment != NULL) {
+        for (int32_t i = 0; i < n_q; i++) {
+            memcpy(moment + i * n, s->moment_q + i * n_q, row);
+            memcpy(moment + i * n + n_q, s->moment_v + i * n_q, row);
+            for (int32_t m = 0; m < n_m; m++) {
+                moment[i * n + 2 * n_q + m] = -s->length_q[m * n_q + i] * s->force_a[m];
+            }
+        }
+    }
+}
+
+static mhe_status muscle_signals(const mhi_signals *signals, const mhe_system *f,
+                                 mhi_system_context *context, uint32_t wanted, const double *x,
+                                 const double *a, double *y, double *jacobian, mhe_error *err) {
+    const mhi_signal *force = &signals->signal[MHI_SIGNAL_MUSCLE_FORCE];
+    const mhi_signal *moment = &signals->signal[MHI_SIGNAL_JOINT_MOMENT];
+    const int want_force = (wanted >> MHI_SIGNAL_MUSCLE_FORCE & 1) != 0;
+    const int want_moment = (wanted >> MHI_SIGNAL_JOINT_MOMENT & 1) != 0;
+    mhi_muscle_state state;
+    mhe_status status =
+        mhi_system_muscles(context, x, x + f->n_q, a, jacobian != NULL, &state, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    if (want_force) {
+        memcpy(y + force->offset, state.force, sizeof(double) * (size_t)force->n_y);
+    }
+    if (want_moment) {
+        memcpy(y + moment->offset, state.moment, sizeof(double) * (size_t)moment->n_y);
+    }
+    if (jacobian != NULL) {
+        muscle_blocks(&state, f->n_q, f->n_m, want_force ? jacobian + force->jacobian : NULL,
+                      want_moment ? jacobian + moment->jacobian : NULL);
+    }
+    return MHE_OK;
+}
+
+mhe_status mhi_signals_evaluate(const mhi_signals *signals, const mhi_system *system,
+                                mhi_system_context *context, uint32_t wanted, const double *x,
+                                const double *u, double *y, double *jacobian, mhe_error *err) {
+    const mhe_system *f = mhi_system_face(system);
+    for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
+        const mhi_signal *s = &signals->signal[i];
+        if ((wanted >> i & 1) == 0) {
+            continue;
+        }
+        if (s->reads_u && u == NULL) {
+            fill_nan(y + s->offset, s->n_y);
+        } else if (s->n_columns == 0) {
+            const double *from = s->column < f->n_x ? x + s->column : u + (s->column - f->n_x);
+            memcpy(y + s->offset, from, sizeof(double) * (size_t)s->n_y);
+        }
+    }
+    mhe_status status = MHE_OK;
+    if (wanted >> MHI_SIGNAL_MARKERS & 1) {
+        const mhi_signal *s = &signals->signal[MHI_SIGNAL_MARKERS];
+        status = mhi_system_markers(context, x, y + s->offset,
+                                    jacobian == NULL ? NULL : jacobian + s->jacobian, err);
+    }
+    const uint32_t of_muscles = 1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT;
+    const double *a = f->n_a > 0 ? x + 2 * f->n_q : u;
+    if (status == MHE_OK && (wanted & of_muscles) != 0 && a != NULL) {
+        status = muscle_signals(signals, f, context, wanted, x, a, y, jacobian, err);
+    }
+    return status;
+}

@@ -1,0 +1,49 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* signals.h: the named quantities that costs read, at one node, with their derivatives.
+ *
+ * z = [x; u] is a node's point. Each signal depends on one contiguous range of z: either y_i =
+ * z[column + i] or a dense block of `n_columns` columns. All signals of a problem lie one after the
+ * other in a vector of n_y values; targets have the same layout. */
+#ifndef MHI_SIGNALS_H
+#define MHI_SIGNALS_H
+
+#include "model/system.h"
+
+enum {
+    MHI_SIGNAL_MARKERS,
+    MHI_SIGNAL_Q,
+    MHI_SIGNAL_QDOT,
+    MHI_SIGNAL_ACTIVATION,
+    MHI_SIGNAL_EXCITATION,
+    MHI_SIGNAL_MUSCLE_FORCE,
+    MHI_SIGNAL_JOINT_MOMENT,
+    MHI_SIGNAL_RESIDUAL_TORQUE,
+    MHI_N_SIGNALS
+};
+
+typedef struct mhi_signal {
+    const char *name, *unit;
+    int32_t n_y;       /* 0: this problem has no such signal */
+    int32_t offset;    /* in the vector of all signals */
+    int32_t column;    /* first column of z it depends on */
+    int32_t n_columns; /* of the dense block; 0: y_i = z[column + i] */
+    int32_t reads_u;   /* has no value at the last node */
+    int32_t jacobian;  /* offset of its dense block in the node's Jacobian store */
+} mhi_signal;
+
+typedef struct mhi_signals {
+    mhi_signal signal[MHI_N_SIGNALS];
+    int32_t n_y;        /* of all signals */
+    int32_t n_jacobian; /* doubles of the Jacobian store */
+} mhi_signals;
+
+void mhi_signals_layout(const mhi_system *system, mhi_signals *signals);
+
+/* Values y [n_y] of the signals in the bit set `wanted` (1 << MHI_SIGNAL_*) at (x, u); u NULL at
+ * the last node, where signals that read u become NaN. With `jacobian` [n_jacobian] also their
+ * dense blocks, row-major. [hot] */
+mhe_status mhi_signals_evaluate(const mhi_signals *signals, const mhi_system *system,
+                                mhi_system_context *context, uint32_t wanted, const double *x,
+                                const double *u, double *y, double *jacobian, mhe_error *err);
+
+#endif

@@ -1,0 +1,289 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "ocp/term.h"
+
+#include <math.h>
+#include <string.h>
+
+static mhe_status check_layout(mhi_term *t, const mhi_signals *signals, mhe_error *err) {
+    const mhe_cost_layout *l = &t->layout;
+    t->n_signals = l->n_signals == 0 ? 1 : l->n_signals;
+    if (t->n_signals < 0 || t->n_signals > MHE_COST_MAX_SIGNALS) {
+        return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gave %d signals", t->id, l->n_signals);
+    }
+    for (int32_t i = 0; i < t->n_signals; i++) {
+        t->signals[i] = l->n_signals == 0 ? l->signal : l->signals[i];
+        if (t->signals[i] < 0 || t->signals[i] >= MHI_N_SIGNALS ||
+            signals->signal[t->signals[i]].n_y == 0) {
+            return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gave a signal that does not exist",
+                            t->id);
+        }
+        t->ny += signals->signal[t->signals[i]].n_y;
+    }
+    if (l->n_res < 1 || (l->jacobian == MHE_JACOBIAN_DIAGONAL && l->n_res != t->ny)) {
+        return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gave %d residuals for %d signal values",
+                        t->id, l->n_res, t->ny);
+    }
+    return MHE_OK;
+}
+
+mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
+                           const mhe_problem *problem, const mhi_signals *signals, mhi_arena *arena,
+                           mhi_term *t, mhe_error *err) {
+    *t = (mhi_term){.ops = setup->plugin->ops,
+                    .id = setup->plugin->id,
+                    .self = setup->config,
+                    .factor = setup->weight / (setup->sigma * setup->sigma)};
+    if (t->ops->create != NULL) {
+        mhe_status status = t->ops->create(host, problem, setup->config, &t->created, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+        t->self = t->created;
+    }
+    t->layout = (mhe_cost_layout){.size = sizeof t->layout};
+    mhe_status status = t->ops->layout(t->self, problem, &t->layout, err);
+    if (status == MHE_OK) {
+        status = check_layout(t, signals, err);
+    }
+    if (status != MHE_OK) {
+        return status;
+    }
+    t->y_index = MHI_TAKE(arena, int32_t, t->ny);
+    t->y_signal = MHI_TAKE(arena, int32_t, t->ny);
+    if (t->y_index == NULL || t->y_signal == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t s = 0, j = 0; s < t->n_signals; s++) {
+        const mhi_signal *signal = &signals->signal[t->signals[s]];
+        for (int32_t i = 0; i < signal->n_y; i++, j++) {
+            t->y_index[j] = signal->offset + i;
+            t->y_signal[j] = t->signals[s];
+        }
+    }
+    t->differenced = t->ops->jacobian == NULL;
+    if (t->differenced) {
+        char text[160];
+        (void)snprintf(text, sizeof text,
+                       "%s has no jacobian(): central differences are used, which is slower",
+                       t->id);
+        host->log(host, MHE_LOG_WARNING, text);
+    }
+    return MHE_OK;
+}
+
+void mhi_term_destroy(mhi_term *t) {
+    if (t->created != NULL) {
+        t->ops->destroy(t->created);
+    }
+}
+
+mhe_status mhi_term_workspace_create(const mhi_term *t, int32_t n_z, mhi_arena *arena,
+                                     mhi_term_workspace *w, mhe_error *err) {
+    const int32_t n_res = t->layout.n_res;
+    const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
+    w->y = MHI_TAKE(arena, double, t->ny);
+    w->y_ref = MHI_TAKE(arena, double, t->ny);
+    w->r = MHI_TAKE(arena, double, n_res);
+    w->r_shift = MHI_TAKE(arena, double, n_res);
+    w->jacobian = MHI_TAKE(arena, double, diagonal ? t->ny : n_res * t->ny);
+    w->row = MHI_TAKE(arena, double, n_z);
+    w->scratch = mhi_arena_take(arena, t->layout.scratch_bytes);
+    if (w->y == NULL || w->y_ref == NULL || w->r == NULL || w->r_shift == NULL ||
+        w->jacobian == NULL || w->row == NULL || w->scratch == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    return MHE_OK;
+}
+
+uint32_t mhi_term_reads(const mhi_term *t) {
+    uint32_t reads = 0;
+    for (int32_t i = 0; i < t->n_signals; i++) {
+        reads |= 1u << t->signals[i];
+    }
+    return reads;
+}
+
+static void mark_columns(const mhi_signal *s, int32_t row, uint8_t *columns) {
+    if (s->n_columns == 0) {
+        columns[s->column + row] = 1;
+    } else {
+        memset(columns + s->column, 1, (size_t)s->n_columns);
+    }
+}
+
+void mhi_term_pattern(const mhi_term *t, const mhi_signals *signals, int32_t n_z, uint8_t *columns,
+                      uint8_t *pattern) {
+    const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
+    memset(columns, 0, (size_t)n_z);
+    for (int32_t j = 0; j < t->ny; j++) {
+        const mhi_signal *s = &signals->signal[t->y_signal[j]];
+        mark_columns(s, t->y_index[j] - s->offset, columns);
+        if (!diagonal && j + 1 < t->ny) {
+            continue;
+        }
+        for (int32_t a = 0; a < n_z; a++) {
+            for (int32_t b = 0; b < n_z && columns[a]; b++) {
+                pattern[a * n_z + b] |= columns[b];
+            }
+        }
+        memset(columns, 0, (size_t)n_z);
+    }
+}
+
+/* Central differences for plugins without jacobian(); step (eps)^(1/3) relative to |y| or 1. */
+static mhe_status difference(const mhi_term *t, mhi_term_workspace *w, mhe_stage *stage,
+                             mhe_error *err) {
+    const int32_t n_res = t->layout.n_res, ny = t->ny;
+    const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
+    for (int32_t j = 0; j < ny; j++) {
+        const double y = w->y[j], step = 6e-6 * fmax(1, fabs(y));
+        w->y[j] = y + step;
+        mhe_status status = t->ops->residual(t->self, stage, w->r_shift, err);
+        for (int32_t i = 0; i < n_res && !diagonal; i++) {
+            w->jacobian[i * ny + j] = w->r_shift[i];
+        }
+        double plus = diagonal ? w->r_shift[j] : 0;
+        w->y[j] = y - step;
+        if (status == MHE_OK) {
+            status = t->ops->residual(t->self, stage, w->r_shift, err);
+        }
+        w->y[j] = y;
+        if (status != MHE_OK) {
+            return status;
+        }
+        if (diagonal) {
+            w->jacobian[j] = (plus - w->r_shift[j]) / (2 * step);
+        }
+        for (int32_t i = 0; i < n_res && !diagonal; i++) {
+            w->jacobian[i * ny + j] = (w->jacobian[i * ny + j] - w->r_shift[i]) / (2 * step);
+        }
+    }
+    return MHE_OK;
+}
+
+/* Adds scale * (g = row r, H = row row^T) for a row whose n entries stand in the columns from
+ * `first` on. */
+static void add_row(const double *row, int32_t first, int32_t n, double r, double scale,
+                    int32_t n_z, mhi_term_sum *sum) {
+    for (int32_t a = 0; a < n; a++) {
+        const double scaled = scale * row[a];
+        double *hessian = sum->hessian + (first + a) * n_z + first;
+        sum->gradient[first + a] += scaled * r;
+        for (int32_t b = 0; b <= a; b++) {
+            hessian[b] += scaled * row[b];
+        }
+    }
+}
+
+/* r_i depends on y_i alone: the row is the signal's own row times a number. */
+static void add_diagonal(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
+                         const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum) {
+    for (int32_t j = 0; j < t->ny; j++) {
+        const double r = w->r[j], d = w->jacobian[j];
+        if (isnan(r) || d == 0) {
+            continue;
+        }
+        const mhi_signal *s = &signals->signal[t->y_signal[j]];
+        const int32_t i = t->y_index[j] - s->offset;
+        if (s->n_columns == 0) {
+            const int32_t c = s->column + i;
+            sum->gradient[c] += scale * d * r;
+            sum->hessian[c * n_z + c] += scale * d * d;
+        } else {
+            const double *block = jacobian + s->jacobian + i * s->n_columns;
+            add_row(block, s->column, s->n_columns, r / d, scale * d * d, n_z, sum);
+        }
+    }
+}
+
+static void add_dense(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
+                      const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum) {
+    for (int32_t i = 0; i < t->layout.n_res; i++) {
+        if (isnan(w->r[i])) {
+            continue;
+        }
+        int32_t first = n_z, end = 0;
+        memset(w->row, 0, sizeof(double) * (size_t)n_z);
+        for (int32_t j = 0; j < t->ny; j++) {
+            const double d = w->jacobian[i * t->ny + j];
+            if (d == 0) {
+                continue;
+            }
+            const mhi_signal *s = &signals->signal[t->y_signal[j]];
+            const int32_t row = t->y_index[j] - s->offset;
+            const int32_t from = s->n_columns == 0 ? s->column + row : s->column;
+            const int32_t to = s->n_columns == 0 ? from + 1 : from + s->n_columns;
+            const double *block = jacobian + s->jacobian + row * s->n_columns;
+            for (int32_t c = from; c < to; c++) {
+                w->row[c] += s->n_columns == 0 ? d : d * block[c - from];
+            }
+            first = from < first ? from : first;
+            end = to > end ? to : end;
+        }
+        if (first < end) {
+            add_row(w->row + first, first, end - first, w->r[i], scale, n_z, sum);
+        }
+    }
+}
+
+/* A NaN residual is missing data where an input is NaN; without one it is the plugin's fault. */
+static mhe_status check_residuals(const mhi_term *t, const mhi_term_workspace *w, mhe_error *err) {
+    int bad = 0;
+    for (int32_t i = 0; i < t->layout.n_res; i++) {
+        if (isinf(w->r[i])) {
+            return mhe_fail(err, MHE_RETRY, "%s: residual %d is infinite", t->id, i);
+        }
+        bad |= isnan(w->r[i]);
+    }
+    for (int32_t j = 0; j < t->ny && bad; j++) {
+        if (isnan(w->y[j]) || isnan(w->y_ref[j])) {
+            bad = 0;
+        }
+    }
+    return bad ? mhe_fail(err, MHE_RETRY, "%s: a residual is NaN although no input is", t->id)
+               : MHE_OK;
+}
+
+mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
+                        const mhe_stage *node, const double *y, const double *target,
+                        const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum,
+                        mhe_error *err) {
+    for (int32_t j = 0; j < t->ny; j++) {
+        w->y[j] = y[t->y_index[j]];
+        w->y_ref[j] = target[t->y_index[j]];
+    }
+    mhe_stage stage = *node;
+    stage.ny = t->ny;
+    stage.y = w->y;
+    stage.y_ref = w->y_ref;
+    stage.scratch = w->scratch;
+    mhe_status status = t->ops->residual(t->self, &stage, w->r, err);
+    if (status == MHE_OK) {
+        status = check_residuals(t, w, err);
+    }
+    if (status != MHE_OK) {
+        return status;
+    }
+    double squares = 0;
+    for (int32_t i = 0; i < t->layout.n_res; i++) {
+        squares += isnan(w->r[i]) ? 0 : w->r[i] * w->r[i];
+    }
+    scale *= t->factor;
+    sum->cost += 0.5 * scale * squares;
+    if (sum->gradient == NULL) {
+        return MHE_OK;
+    }
+    const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
+    if (t->differenced) {
+        status = difference(t, w, &stage, err);
+    } else {
+        const int32_t n = diagonal ? t->ny : t->layout.n_res * t->ny;
+        memset(w->jacobian, 0, sizeof(double) * (size_t)n);
+        status = t->ops->jacobian(t->self, &stage, w->jacobian, err);
+    }
+    if (status != MHE_OK) {
+        return status;
+    }
+    (diagonal ? add_diagonal : add_dense)(t, w, signals, jacobian, scale, n_z, sum);
+    return MHE_OK;
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* term.h: one cost plugin in a problem: signals in, weighted sum of squares with gradient and
+ * Gauss-Newton Hessian out. */
+#ifndef MHI_TERM_H
+#define MHI_TERM_H
+
+#include "base/arena.h"
+#include "ocp/signals.h"
+
+#include <mhe/cost.h>
+
+/* A plugin with its config and the options common to all costs. */
+typedef struct mhi_term_setup {
+    const mhe_plugin *plugin;
+    const void *config;
+    double weight; /* [1] */
+    double sigma;  /* unit of r: r counts as r / sigma */
+} mhi_term_setup;
+
+typedef struct mhi_term {
+    const mhe_cost_ops *ops;
+    const char *id;
+    const void *self;
+    void *created; /* what destroy() takes; NULL where the plugin has no create */
+    double factor; /* weight / sigma^2 */
+    mhe_cost_layout layout;
+    int32_t n_signals;
+    int32_t signals[MHE_COST_MAX_SIGNALS];
+    int32_t ny;
+    int32_t *y_index;    /* [ny] place in the vector of all signals */
+    int32_t *y_signal;   /* [ny] which signal */
+    int32_t differenced; /* no jacobian(): central differences */
+} mhi_term;
+
+/* Memory of one thread for one term. */
+typedef struct mhi_term_workspace {
+    double *y, *y_ref;   /* [ny] */
+    double *r, *r_shift; /* [n_res] */
+    double *jacobian;    /* [ny] or [n_res x ny] */
+    double *row;         /* [n_z] */
+    void *scratch;
+} mhi_term_workspace;
+
+/* Where a term adds its share; derivatives all or none NULL. Row-major, n_z = n_x + n_u (n_x at the
+ * last node). */
+typedef struct mhi_term_sum {
+    double cost;
+    double *gradient; /* [n_z] */
+    double *hessian;  /* [n_z x n_z], lower triangle only */
+} mhi_term_sum;
+
+/* Creates the plugin's instance and lays it out. `problem` and `signals` must outlive the term.
+ * [cold] */
+mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
+                           const mhe_problem *problem, const mhi_signals *signals, mhi_arena *arena,
+                           mhi_term *term, mhe_error *err);
+void mhi_term_destroy(mhi_term *term);
+mhe_status mhi_term_workspace_create(const mhi_term *term, int32_t n_z, mhi_arena *arena,
+                                     mhi_term_workspace *workspace, mhe_error *err);
+
+/* Bit set of the signals it reads. */
+uint32_t mhi_term_reads(const mhi_term *term);
+/* Marks in pattern [n_z x n_z] what its Gauss-Newton Hessian can fill; `columns` [n_z] is scratch.
+ */
+void mhi_term_pattern(const mhi_term *term, const mhi_signals *signals, int32_t n_z,
+                      uint8_t *columns, uint8_t *pattern);
+
+/* Adds scale * factor * 1/2 |r|^2 and derivatives at one node. `y`, `target` [signals->n_y],
+ * `jacobian` as from mhi_signals_evaluate. Rows that are NaN because data or signals are missing
+ * drop out. [hot] */
+mhe_status mhi_term_add(const mhi_term *term, mhi_term_workspace *workspace,
+                        const mhi_signals *signals, const mhe_stage *node, const double *y,
+                        const double *target, const double *jacobian, double scale, int32_t n_z,
+                        mhi_term_sum *sum, mhe_error *err);
+
+#endif
