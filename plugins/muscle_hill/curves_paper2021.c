@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* curves_paper2021.c: what Bailly et al. (2021), doi:10.3389/fbioe.2021.642742, ran.
+ *
+ * Pennation at constant angle, n = (L - l_slack) / (cos(alpha) l_opt), no cos(alpha) on the force.
+ * s is the musculotendon velocity over 10 m/s, whatever the optimal length and the angle. Two
+ * types: "hillthelen" where the file says Thelen, else "hill".
+ *
+ * Kinks: fv at s = 0, slope of shortening taken there; fp switches on where the *fibre* length
+ * passes the tendon slack length (a jump; the slopes are those of either side). */
+#include "hill.h"
+#include "shapes.h"
+
+#define PAPER_SPEED 0.1   /* 1 / (10 m/s) */
+#define PAPER_DAMPING 0.1 /* of F_max at 10 optimal lengths per second */
+
+static void paper_hill(const struct hill_muscle *muscle, double a, double n, double s,
+                       struct hill_value *out) {
+    double fl_a;
+    struct hill_shape fl = hill_moving_bell(a, n, &fl_a), fp = {0, 0};
+    if (n > muscle->passive_from) {
+        fp = hill_exponential(n, 10, 0, muscle->passive_scale);
+    }
+    hill_total(a, fl, fl_a, hill_hyperbola(s), fp, out);
+}
+
+static void paper_hill_thelen(const struct hill_muscle *muscle, double a, double n, double s,
+                              struct hill_value *out) {
+    struct hill_shape fp = {0, 0};
+    if (n > muscle->passive_from) {
+        fp = hill_exponential(n, 10, 1, muscle->passive_scale);
+    }
+    hill_total(a, hill_bell(n, 0.45), 0, hill_hyperbola(s), fp, out);
+}
+
+static int paper_says_thelen(const mhe_muscle *muscle) {
+    return muscle->type == MHE_MUSCLE_HILL_THELEN || muscle->type == MHE_MUSCLE_THELEN2003;
+}
+
+static void paper_prepare(const mhe_muscle *muscle, const struct hill_config *config,
+                          struct hill_muscle *out) {
+    (void)config;
+    int thelen = paper_says_thelen(muscle);
+    out->curve = thelen ? paper_hill_thelen : paper_hill;
+    out->inv_cos = 1 / cos(hill_or(muscle->pennation_angle, 0));
+    out->pull = 1;
+    out->speed = PAPER_SPEED;
+    out->damping = PAPER_DAMPING * out->inverse;
+    out->passive_from = out->l_slack * out->inverse;
+    out->passive_scale = thelen ? 1 / expm1(5) : exp(-5);
+}
+
+const struct hill_curve_set hill_paper2021 = {.name = "paper2021", .prepare = paper_prepare};

@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* hill.h: one Hill muscle with a rigid tendon, and the curve sets it can run on.
+ *
+ * Symbols follow muscle-curve literature: n fibre length over optimal fibre length, s normalised
+ * fibre velocity (lengthening positive; each set says by what it is divided), fl active
+ * force-length, fv force-velocity, fp passive. A muscle's force is
+ *     F = f_max (a fl fv + fp + damping s) pull
+ * where `pull` is the share of the fibre force along the tendon. */
+#ifndef MUSCLE_HILL_H
+#define MUSCLE_HILL_H
+
+#include <mhe/muscle.h>
+
+/* Filled by the core from the option table in plugin.c. */
+struct hill_config {
+    int32_t curves;   /* position in hill_curve_sets */
+    double tau_act;   /* s; 0: the file's, else 0.010 */
+    double tau_deact; /* s; 0: the file's, else 0.040 */
+    double activation_smoothing;
+    double damping; /* below 0: the file's, else 0 */
+    double vmax;    /* optimal lengths per second; 0: the file's, else 10 */
+};
+
+/* a fl fv + fp and its derivatives by a, n and s. */
+struct hill_value {
+    double f, f_a, f_n, f_s;
+};
+
+struct hill_muscle;
+typedef void (*hill_curve)(const struct hill_muscle *muscle, double a, double n, double s,
+                           struct hill_value *out);
+
+struct hill_muscle {
+    hill_curve curve;
+    double f_max;   /* N */
+    double l_slack; /* m */
+    double inverse; /* n per metre of fibre: 1 / l_opt */
+    double speed;   /* s per m/s of fibre velocity */
+    double damping; /* f_max per unit of s */
+    double pull;    /* constant angle: share of the fibre force along the tendon */
+    double inv_cos; /* constant angle: 1 / cos(pennation) */
+    double height;  /* constant thickness: l_opt sin(pennation), m; 0: constant angle */
+    /* shapes of the passive and active curves, where a set has them to choose */
+    double passive_from;   /* n above which fp acts */
+    double passive_rate;   /* exponent per unit of n */
+    double passive_offset; /* taken off the exponential */
+    double passive_scale;  /* 1 / (exp(k_PE) - 1) or the like */
+    double active_width;   /* Thelen gamma */
+    double concentric;     /* 1 / A_f */
+    double eccentric;      /* (2 + 2 / A_f) / (F_len - 1) */
+    double eccentric_max;  /* F_len */
+};
+
+/* A curve set. `prepare` fills everything of `out` that the curves decide, from a checked
+ * description and the overrides of `config`; f_max, l_slack and inverse are already there. */
+struct hill_curve_set {
+    const char *name;
+    int32_t published; /* takes the overrides `damping` and `vmax` */
+    void (*prepare)(const mhe_muscle *muscle, const struct hill_config *config,
+                    struct hill_muscle *out);
+};
+
+extern const struct hill_curve_set hill_paper2021, hill_biorbd, hill_degroote2016, hill_thelen2003;
+
+/* Order of the choices of the option `curves`. */
+extern const struct hill_curve_set *const hill_curve_sets[];
+#define HILL_CURVE_CHOICES "auto|paper2021|biorbd|degroote2016|thelen2003"
+
+/* An instance: the muscles in the order of the model. */
+struct hill {
+    int32_t n;
+    double smoothing;      /* b of the activation dynamics */
+    double *rate_act;      /* 1 / tau_act, 1/s [n] */
+    double *rate_deact;    /* 1 / tau_deact, 1/s [n] */
+    struct hill_muscle *m; /* [n] */
+};
+
+extern const mhe_muscle_ops hill_ops;
+mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t n_muscles,
+                       const void *config, void **self, mhe_error *err);
+void hill_destroy(void *self);
+
+/* `stated`, or `otherwise` where the file says nothing (NaN). */
+double hill_or(double stated, double otherwise);
+
+/* Pennation of a published set: constant muscle thickness, velocity in vmax. */
+void hill_published_geometry(const mhe_muscle *muscle, const struct hill_config *config,
+                             struct hill_muscle *out);
+
+#endif

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* plugin.c: the descriptor and options of mhe.muscle.hill. */
+#include "hill.h"
+
+static const mhe_option hill_options[] = {
+    MHE_OPT_ENUM(struct hill_config, curves, "auto", HILL_CURVE_CHOICES,
+                 "Curve set; auto is degroote2016."),
+    MHE_OPT_REAL(struct hill_config, tau_act, 0, 0, 10, "s",
+                 "Activation time constant; 0: the file's, else 0.010."),
+    MHE_OPT_REAL(struct hill_config, tau_deact, 0, 0, 10, "s",
+                 "Deactivation time constant; 0: the file's, else 0.040."),
+    MHE_OPT_REAL(struct hill_config, activation_smoothing, 0.1, 1e-3, 1e3, "1",
+                 "Steepness b of the switch between activation and deactivation."),
+    MHE_OPT_REAL(struct hill_config, damping, -1, -1, 10, "1",
+                 "Fibre damping in maximal isometric forces at vmax, degroote2016 and thelen2003 "
+                 "only; below 0: the file's, else 0."),
+    MHE_OPT_REAL(struct hill_config, vmax, 0, 0, 1e3, "1/s",
+                 "Maximal contraction velocity in optimal lengths per second, degroote2016 and "
+                 "thelen2003 only; 0: the file's, else 10."),
+};
+
+static const mhe_plugin hill_plugin = {
+    .size = sizeof hill_plugin,
+    .id = "mhe.muscle.hill",
+    .version = "0.1.0",
+    .summary = "Hill muscles with rigid tendons on one of four curve sets, with the smooth "
+               "activation dynamics of De Groote et al.",
+    .reference = "doi:10.1007/s10439-016-1591-9",
+    .iface = MHE_MUSCLE_IFACE,
+    .ops = &hill_ops,
+    MHE_PLUGIN_OPTIONS(struct hill_config, hill_options)};
+
+MHE_PLUGIN_LIBRARY(&hill_plugin)
