@@ -398,6 +398,11 @@ double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k) {
     return s->n_y == 0 ? NULL : ocp->targets + (ptrdiff_t)k * ocp->signals.n_y + s->offset;
 }
 
+void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {
+    ocp->interval = interval;
+    ocp->problem.interval = interval;
+}
+
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {
     ocp->times[k] = time;
 }

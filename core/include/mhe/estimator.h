@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* estimator.h: the C API that an application embeds.
+ *
+ *     mhe_estimator *e;  mhe_error err;
+ *     mhe_estimator_open("arm.yaml", NULL, 0, NULL, &e, &err);
+ *     while (measure(&frame)) {
+ *         mhe_estimator_push(e, &frame, &estimate, &ready, &err);
+ *         if (ready) { show(estimate.force); }
+ *     }
+ *     mhe_estimator_close(e);
+ *
+ * Moving horizon estimation (Bailly et al. 2021, doi:10.3389/fbioe.2021.642742, Algorithm 1): the
+ * window holds the newest N+1 frames; each new frame drops the oldest, fixes the first state to the
+ * previous solution's second, and solves again from the shifted solution. The estimate is that of
+ * the window's first node.
+ *
+ * Threads: one estimator belongs to one thread at a time; several estimators are independent. */
+#ifndef MHE_ESTIMATOR_H
+#define MHE_ESTIMATOR_H
+
+#include <mhe/abi.h>
+#include <mhe/host.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct mhe_estimator mhe_estimator;
+
+/* Sizes and names, constant over the estimator's life. Names live as long as it. */
+typedef struct mhe_estimator_info {
+    uint32_t size;
+    int32_t formulation; /* 0: excitation-driven, 1: activation-driven */
+    int32_t n_q, n_muscles, n_markers, n_residual_torques;
+    int32_t window;  /* intervals N */
+    int32_t ratio;   /* every ratio-th frame is used */
+    double interval; /* s between nodes */
+    const char *const *coordinate_names;
+    const char *const *muscle_names;
+    const char *const *marker_names;
+    const char *solver; /* plugin ids */
+    const char *config_name;
+} mhe_estimator_info;
+
+/* One measurement. Missing values are NaN; a NULL array is all missing. Lent for the call. */
+typedef struct mhe_frame {
+    uint32_t size;
+    double time;           /* s */
+    const double *markers; /* [n_markers x 3], m, ground frame */
+    const double *emg;     /* [n_muscles], normalised 0..1 */
+} mhe_frame;
+
+/* How a frame's estimate came about. */
+#define MHE_FRAME_OK 0              /* the solve converged */
+#define MHE_FRAME_ITERATION_LIMIT 1 /* the best iterate after max_iterations */
+#define MHE_FRAME_DEADLINE 2        /* the best iterate at the deadline */
+#define MHE_FRAME_PREDICTED \
+    3 /* the solve failed: the model's prediction from the last good state */
+#define MHE_FRAME_RESTARTED 4 /* first solve after a restart of the window */
+
+/* Arrays are the estimator's own and valid until its next call; never NaN. */
+typedef struct mhe_estimate {
+    uint32_t size;
+    int32_t status; /* MHE_FRAME_* */
+    double time;    /* s, of the frame it belongs to */
+    int32_t iterations;
+    double kkt_residual;
+    double solve_time;  /* s, whole call of push */
+    double marker_rms;  /* m, distance of estimated and measured markers; NaN without markers */
+    double emg_rms;     /* difference of muscle control and EMG; NaN without EMG */
+    const double *q;    /* [n_q], rad (m) */
+    const double *qdot; /* [n_q], rad/s (m/s) */
+    const double *activation; /* [n_muscles] */
+    const double *excitation; /* [n_muscles]; activation-driven: NULL */
+    const double *force;      /* muscle forces [n_muscles], N */
+    const double *moment;     /* joint moments by the muscles [n_q], N m */
+    const double *residual;   /* residual joint torques [n_residual_torques], N m */
+    const double *markers;    /* [n_markers x 3], m */
+} mhe_estimate;
+
+/* Opens a config file with `set` [n_set] assignments "path.to.key=value". `host` may be NULL
+ * (messages are dropped). MHE_E_CONFIG, MHE_E_INPUT, MHE_E_PLUGIN: err->text says file:line and
+ * what. [cold] */
+mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
+                              const mhe_host *host, mhe_estimator **estimator, mhe_error *err);
+void mhe_estimator_close(mhe_estimator *estimator);
+
+void mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
+
+/* Takes the next frame (time must increase). `*ready` is 1 when `estimate` was filled: from the
+ * window's first fill on, at every ratio-th frame. A bad frame or a failed solve is told by
+ * estimate->status; a negative status of the function means misuse (time not increasing) or a bug.
+ */
+mhe_status mhe_estimator_push(mhe_estimator *estimator, const mhe_frame *frame,
+                              mhe_estimate *estimate, int32_t *ready, mhe_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

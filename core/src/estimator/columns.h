@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* columns.h: which column of a table belongs to which name of the model, and its values at given
+ * times. */
+#ifndef MHI_COLUMNS_H
+#define MHI_COLUMNS_H
+
+#include "io/table.h"
+
+#include <mhe/host.h>
+
+/* How the columns of one quantity may be called: any of the patterns, where %s stands for the
+ * model's name and %d for its 1-based number. */
+typedef struct mhi_naming {
+    const char *what;        /* "marker", "muscle": for messages */
+    const char *patterns[6]; /* NULL-terminated */
+    int32_t required;        /* no column matches: an error; typing slips: an error */
+} mhi_naming;
+
+/* column[i] of names[i] [n], -1 if absent; `*n_found` counts. `used` [n_columns or labels] is
+ * marked. MHE_E_INPUT as recording.h says. */
+mhe_status mhi_columns_match(const mhi_table *table, const mhi_naming *naming,
+                             const char *const *names, int32_t n, int32_t n_labels, int32_t *column,
+                             uint8_t *used, int32_t *n_found, const mhe_host *host, mhe_error *err);
+
+/* Value of a column at a time: the row within half a microsecond of it, else linear between
+ * neighbours (`hold`: the row before); NaN outside the table and beside missing values. */
+double mhi_column_at(const mhi_table *table, int32_t column, double time, int32_t hold);
+
+#endif

@@ -1,0 +1,354 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* estimator.c: the public estimator: frames in, estimates out. */
+#include "estimator/estimator_private.h"
+#include "io/model_file.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static mhe_status read_model(mhe_estimator *e, mhe_error *err) {
+    const mhi_model_section *section = &e->run->model_file;
+    mhe_status status = mhi_model_read(section->file, &e->description, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    const mhe_description *d = e->description;
+    for (int32_t i = 0; i < d->n_warnings; i++) {
+        e->host->log(e->host, MHE_LOG_WARNING, d->warnings[i]);
+    }
+    for (int32_t i = 0; i < d->n_unsupported; i++) {
+        e->host->log(e->host, MHE_LOG_WARNING, d->unsupported[i]);
+    }
+    if (d->n_unsupported > 0 && section->unsupported == MHI_UNSUPPORTED_STOP) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s (%d such element%s; 'model.unsupported: warn' goes on without)",
+                        d->unsupported[0], d->n_unsupported, d->n_unsupported == 1 ? "" : "s");
+    }
+    return MHE_OK;
+}
+
+static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
+    const mhi_run *run = e->run;
+    const mhi_system_setup system = {.host = e->host,
+                                     .description = e->description,
+                                     .model = run->model.plugin,
+                                     .model_config = run->model.config,
+                                     .muscle = run->muscle.plugin,
+                                     .muscle_config = run->muscle.config,
+                                     .formulation = run->formulation,
+                                     .residual_torques = run->bounds.residual_torques};
+    mhe_status status = mhi_system_create(&system, &e->system, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    mhi_term_setup *terms = MHI_TAKE(&e->arena, mhi_term_setup, run->n_costs);
+    if (terms == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < run->n_costs; i++) {
+        const mhi_use *cost = &run->costs[i];
+        terms[i] = (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma};
+    }
+    const mhi_ocp_setup ocp = {.host = e->host,
+                               .system = e->system,
+                               .integrator = run->integrator.plugin,
+                               .integrator_config = run->integrator.config,
+                               .terms = terms,
+                               .n_terms = run->n_costs,
+                               .n_intervals = run->horizon.window,
+                               .interval = 0.01 * run->horizon.ratio, /* until frames tell */
+                               .n_workers = 1};
+    status = mhi_ocp_create(&ocp, &e->ocp, err);
+    if (status == MHE_OK) {
+        status = e->solver->create(e->host, mhi_ocp_face(e->ocp), run->solver.config,
+                                   &e->solver_self, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_start_create(e->system, mhi_ocp_context(e->ocp), &e->start, err);
+    }
+    return status;
+}
+
+static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
+    const int32_t nodes = e->n + 1;
+    struct {
+        double **array;
+        int32_t n;
+    } wanted[] = {{&e->times, nodes},
+                  {&e->markers, nodes * 3 * e->n_k},
+                  {&e->emg, nodes * e->n_m},
+                  {&e->delay_line, (e->delay + 1) * e->n_m},
+                  {&e->solution.x, nodes * e->n_x},
+                  {&e->solution.u, e->n * e->n_u},
+                  {&e->solution.lambda, e->n * e->n_x},
+                  {&e->solution.zx_lower, nodes * e->n_x},
+                  {&e->solution.zx_upper, nodes * e->n_x},
+                  {&e->solution.zu_lower, e->n * e->n_u},
+                  {&e->solution.zu_upper, e->n * e->n_u},
+                  {&e->guess_x, nodes * e->n_x},
+                  {&e->guess_u, e->n * e->n_u},
+                  {&e->start_q, e->n_q},
+                  {&e->start_v, e->n_q},
+                  {&e->no_markers, 3 * e->n_k},
+                  {&e->no_emg, e->n_m},
+                  {&e->out_q, e->n_q},
+                  {&e->out_v, e->n_q},
+                  {&e->out_activation, e->n_m},
+                  {&e->out_excitation, e->n_m},
+                  {&e->out_force, e->n_m},
+                  {&e->out_moment, e->n_q},
+                  {&e->out_residual, e->n_q},
+                  {&e->out_marker, 3 * e->n_k}};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
+        *wanted[i].array = MHI_TAKE(&e->arena, double, wanted[i].n);
+        if (*wanted[i].array == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+    }
+    for (int32_t i = 0; i < (e->delay + 1) * e->n_m; i++) {
+        e->delay_line[i] = NAN;
+    }
+    for (int32_t i = 0; i < 3 * e->n_k; i++) {
+        e->no_markers[i] = NAN;
+    }
+    for (int32_t i = 0; i < e->n_m; i++) {
+        e->no_emg[i] = NAN;
+    }
+    e->solution.size = sizeof e->solution;
+    e->last_time = -INFINITY;
+    return MHE_OK;
+}
+
+static mhe_status start_from_config(mhe_estimator *e, mhe_error *err) {
+    const mhi_initial_section *initial = &e->run->initial;
+    const int32_t given[2] = {initial->q.n, initial->qdot.n};
+    for (int32_t i = 0; i < 2; i++) {
+        if (given[i] != 0 && given[i] != e->n_q) {
+            return mhe_fail(err, MHE_E_CONFIG,
+                            "%s: initial.%s has %d values; the model has %d coordinates",
+                            e->run->path, i == 0 ? "q" : "qdot", given[i], e->n_q);
+        }
+    }
+    if (given[0] > 0) {
+        mhi_estimator_set_start(e, initial->q.values,
+                                given[1] > 0 ? initial->qdot.values : e->start_v);
+    }
+    return MHE_OK;
+}
+
+mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
+                                mhe_error *err) {
+    *estimator = NULL;
+    mhe_estimator *e = calloc(1, sizeof *e);
+    if (e == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    e->host = host;
+    e->run = run;
+    e->solver = run->solver.plugin->ops;
+    e->n = run->horizon.window;
+    e->delay = run->data.emg_delay;
+    mhe_status status = read_model(e, err);
+    if (status == MHE_OK) {
+        status = create_problem(e, err);
+    }
+    if (status == MHE_OK) {
+        const mhe_system *f = mhi_system_face(e->system);
+        e->n_q = f->n_q;
+        e->n_m = f->n_m;
+        e->n_r = f->n_r;
+        e->n_x = f->n_x;
+        e->n_u = f->n_u;
+        e->n_k = e->description->n_markers;
+        status = take_arrays(e, err);
+    }
+    if (status == MHE_OK) {
+        status = start_from_config(e, err);
+    }
+    if (status != MHE_OK) {
+        mhe_estimator_close(e);
+        return status;
+    }
+    *estimator = e;
+    return MHE_OK;
+}
+
+static void silent(const mhe_host *host, int32_t level, const char *text) {
+    (void)host, (void)level, (void)text;
+}
+
+static const void *no_service(const mhe_host *host, const char *id) {
+    (void)host, (void)id;
+    return NULL;
+}
+
+mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
+                              const mhe_host *host, mhe_estimator **estimator, mhe_error *err) {
+    static const mhe_host quiet = {.size = sizeof quiet, .log = silent, .service = no_service};
+    host = host == NULL ? &quiet : host;
+    mhi_registry *registry = NULL;
+    mhi_run *run = NULL;
+    *estimator = NULL;
+    mhe_status status = mhi_registry_create(host, &registry, err);
+    if (status == MHE_OK) {
+        status = mhi_run_read(config, set, n_set, registry, &run, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_estimator_create(run, host, estimator, err);
+    }
+    if (status != MHE_OK) {
+        mhi_run_free(run);
+        mhi_registry_free(registry);
+        return status;
+    }
+    (*estimator)->registry = registry;
+    (*estimator)->owned_run = run;
+    return MHE_OK;
+}
+
+void mhe_estimator_close(mhe_estimator *e) {
+    if (e == NULL) {
+        return;
+    }
+    mhi_start_free(e->start);
+    if (e->solver_self != NULL) {
+        e->solver->destroy(e->solver_self);
+    }
+    mhi_ocp_free(e->ocp);
+    mhi_system_free(e->system);
+    mhi_description_free(e->description);
+    mhi_run_free(e->owned_run);
+    mhi_registry_free(e->registry);
+    mhi_arena_free(&e->arena);
+    free(e);
+}
+
+const mhe_description *mhi_estimator_description(const mhe_estimator *e) {
+    return e->description;
+}
+
+mhi_ocp *mhi_estimator_ocp(mhe_estimator *e) {
+    return e->ocp;
+}
+
+void mhi_estimator_set_start(mhe_estimator *e, const double *q, const double *qdot) {
+    memcpy(e->start_q, q, sizeof(double) * (size_t)e->n_q);
+    memmove(e->start_v, qdot, sizeof(double) * (size_t)e->n_q);
+    e->start_known = 1;
+}
+
+void mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *info) {
+    const mhe_problem *p = mhi_ocp_problem(e->ocp);
+    *info = (mhe_estimator_info){.size = sizeof *info,
+                                 .formulation = p->formulation,
+                                 .n_q = e->n_q,
+                                 .n_muscles = e->n_m,
+                                 .n_markers = e->n_k,
+                                 .n_residual_torques = e->n_r,
+                                 .window = e->n,
+                                 .ratio = e->run->horizon.ratio,
+                                 .interval = p->interval,
+                                 .coordinate_names = p->coordinate_names,
+                                 .muscle_names = p->muscle_names,
+                                 .marker_names = p->marker_names,
+                                 .solver = e->run->solver.plugin->id,
+                                 .config_name = e->run->name};
+}
+
+/* The EMG that a node at this frame tracks: that of `delay` frames ago. */
+static const double *delayed_emg(mhe_estimator *e, const double *emg) {
+    const int32_t slots = e->delay + 1;
+    const int32_t put = (int32_t)(e->n_frames % slots), get = (int32_t)((e->n_frames + 1) % slots);
+    memcpy(e->delay_line + put * e->n_m, emg, sizeof(double) * (size_t)e->n_m);
+    return e->delay_line + get * e->n_m;
+}
+
+static double rms_distance(const double *a, const double *b, int32_t n, int32_t per_point) {
+    double squares = 0;
+    int32_t count = 0;
+    for (int32_t i = 0; i < n; i++) {
+        const double d = a[i] - b[i];
+        squares += isnan(d) ? 0 : d * d;
+        count += !isnan(d);
+    }
+    return count == 0 ? NAN : sqrt(per_point * squares / count);
+}
+
+/* Everything that is told about node 0. */
+static mhe_status give_estimate(mhe_estimator *e, mhe_estimate *out, mhe_error *err) {
+    const double *x = e->solution.x, *u = e->solution.u;
+    const int driven = e->n_x > 2 * e->n_q;
+    const double *a = driven ? x + 2 * e->n_q : u;
+    const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;
+    memcpy(e->out_q, x, n_q);
+    memcpy(e->out_v, x + e->n_q, n_q);
+    memcpy(e->out_activation, a, n_m);
+    memcpy(e->out_excitation, u, n_m);
+    memcpy(e->out_residual, u + e->n_m, sizeof(double) * (size_t)e->n_r);
+    mhi_muscle_state muscles;
+    mhi_system_context *context = mhi_ocp_context(e->ocp);
+    mhe_status status = mhi_system_muscles(context, x, x + e->n_q, a, 0, &muscles, err);
+    if (status == MHE_OK) {
+        memcpy(e->out_force, muscles.force, n_m);
+        memcpy(e->out_moment, muscles.moment, n_q);
+        status = mhi_system_markers(context, x, e->out_marker, NULL, err);
+    }
+    out->time = e->times[0];
+    out->marker_rms = rms_distance(e->out_marker, e->markers, 3 * e->n_k, 3);
+    out->emg_rms = rms_distance(u, e->emg, e->n_m, 1);
+    out->q = e->out_q;
+    out->qdot = e->out_v;
+    out->activation = e->out_activation;
+    out->excitation = driven ? e->out_excitation : NULL;
+    out->force = e->out_force;
+    out->moment = e->out_moment;
+    out->residual = e->out_residual;
+    out->markers = e->out_marker;
+    return status;
+}
+
+mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_estimate *estimate,
+                              int32_t *ready, mhe_error *err) {
+    const double begin = now();
+    *ready = 0;
+    if (!(frame->time > e->last_time) || !isfinite(frame->time)) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "frame time %g s does not follow %g s", frame->time,
+                        e->last_time);
+    }
+    e->last_time = frame->time;
+    const double *emg = delayed_emg(e, frame->emg == NULL ? e->no_emg : frame->emg);
+    const int used = e->n_frames++ % e->run->horizon.ratio == 0;
+    if (!used) {
+        return MHE_OK;
+    }
+    mhi_window_append(e, frame->time, frame->markers == NULL ? e->no_markers : frame->markers, emg);
+    if (e->filled <= e->n) {
+        return MHE_OK;
+    }
+    mhe_solve_info info = {.size = sizeof info};
+    *estimate = (mhe_estimate){.size = sizeof *estimate};
+    mhe_status status = mhi_window_prepare(e, err);
+    if (status == MHE_OK) {
+        status = mhi_window_solve(e, &info, &estimate->status, err);
+    }
+    if (status == MHE_OK) {
+        status = give_estimate(e, estimate, err);
+    }
+    if (status != MHE_OK) {
+        return status;
+    }
+    mhi_window_advance(e);
+    estimate->iterations = info.iterations;
+    estimate->kkt_residual = info.kkt_residual;
+    estimate->solve_time = now() - begin;
+    *ready = 1;
+    return MHE_OK;
+}

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* recording.h: the data section's files as frames of one model: columns found by name, on the
+ * markers' time grid. */
+#ifndef MHI_RECORDING_H
+#define MHI_RECORDING_H
+
+#include "config/run.h"
+
+#include <mhe/description.h>
+#include <mhe/host.h>
+
+/* What is known of the truth, on the frames' times. NaN where a column is absent. */
+typedef struct mhi_reference {
+    int32_t present;
+    double *q, *qdot;                /* [n_frames x n_q] */
+    double *activation, *excitation; /* [n_frames x n_m] */
+    double *force;                   /* [n_frames x n_m]; NaN where the file has none */
+} mhi_reference;
+
+typedef struct mhi_recording {
+    int32_t n_frames;
+    double rate;     /* Hz */
+    double *time;    /* [n_frames], s */
+    double *markers; /* [n_frames x 3 n_k], m, NaN = missing; NULL without a markers file */
+    double *emg;     /* [n_frames x n_m], NaN = missing; NULL without an EMG file */
+    double unit;     /* metres per unit of the marker file */
+    char unit_name[8];
+    int32_t n_markers_found, n_emg_found;
+    mhi_reference reference;
+} mhi_recording;
+
+/* Reads the files that run->data names for a model. Columns that match nothing are told to `host`
+ * as warnings; a file of which no column matches, or whose column is nearly the name of a missing
+ * one, is an error. MHE_E_INPUT. [cold] */
+mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *model,
+                              const mhe_host *host, mhi_recording **recording, mhe_error *err);
+void mhi_recording_free(mhi_recording *recording);
+
+#endif

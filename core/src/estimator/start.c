@@ -1,0 +1,184 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "estimator/start.h"
+
+#include "base/arena.h"
+#include "base/cholesky.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MAX_ITERATIONS 60
+#define N_POSTURES 12 /* of the search */
+
+struct mhi_start {
+    const mhe_description *description;
+    mhi_system_context *context;
+    int32_t n_q, n_k;
+    double *marker, *marker_q; /* [3 n_k], [3 n_k x n_q] */
+    double *normal, *step;     /* [n_q x n_q], [n_q] */
+    double *gradient, *trial, *best;
+    mhi_arena arena;
+};
+
+mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *context,
+                            mhi_start **start, mhe_error *err) {
+    *start = NULL;
+    const mhe_description *d = mhi_system_description(system);
+    mhi_arena arena = {0};
+    mhi_start *s = MHI_TAKE(&arena, mhi_start, 1);
+    if (s == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    s->description = d;
+    s->context = context;
+    s->n_q = d->n_coordinates;
+    s->n_k = d->n_markers;
+    s->marker = MHI_TAKE(&arena, double, 3 * s->n_k);
+    s->marker_q = MHI_TAKE(&arena, double, 3 * s->n_k * s->n_q);
+    s->normal = MHI_TAKE(&arena, double, s->n_q * s->n_q);
+    s->step = MHI_TAKE(&arena, double, s->n_q);
+    s->gradient = MHI_TAKE(&arena, double, s->n_q);
+    s->trial = MHI_TAKE(&arena, double, s->n_q);
+    s->best = MHI_TAKE(&arena, double, s->n_q);
+    s->arena = arena;
+    if (!s->marker || !s->marker_q || !s->normal || !s->step || !s->gradient || !s->trial ||
+        !s->best) {
+        mhi_start_free(s);
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    *start = s;
+    return MHE_OK;
+}
+
+void mhi_start_free(mhi_start *start) {
+    if (start != NULL) {
+        mhi_arena arena = start->arena;
+        mhi_arena_free(&arena);
+    }
+}
+
+/* Sum of squared distances at q over the markers that are there, their number in *n; with the
+ * normal equations when `linearise` is set. */
+static mhe_status distances(mhi_start *s, const double *measured, const double *q, int linearise,
+                            double *squares, int32_t *n, mhe_error *err) {
+    mhe_status status =
+        mhi_system_markers(s->context, q, s->marker, linearise ? s->marker_q : NULL, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    *squares = 0;
+    *n = 0;
+    if (linearise) {
+        memset(s->normal, 0, sizeof(double) * (size_t)(s->n_q * s->n_q));
+        memset(s->gradient, 0, sizeof(double) * (size_t)s->n_q);
+    }
+    for (int32_t i = 0; i < 3 * s->n_k; i++) {
+        const double r = s->marker[i] - measured[i];
+        if (isnan(r)) {
+            continue;
+        }
+        *squares += r * r;
+        *n += 1;
+        const double *row = s->marker_q + i * s->n_q;
+        for (int32_t a = 0; a < s->n_q && linearise; a++) {
+            s->gradient[a] += row[a] * r;
+            for (int32_t b = 0; b < s->n_q; b++) {
+                s->normal[a * s->n_q + b] += row[a] * row[b];
+            }
+        }
+    }
+    return MHE_OK;
+}
+
+static double clip(const mhe_coordinate *c, double value) {
+    return fmin(fmax(value, c->lower), c->upper);
+}
+
+/* Solves (H + damping (D + 1e-6 max D)) step = -gradient and sets the trial posture, kept in range;
+ * its length. */
+static double propose(mhi_start *s, const double *q, double damping) {
+    const int32_t n = s->n_q;
+    double largest = 1e-12;
+    for (int32_t i = 0; i < n; i++) {
+        largest = fmax(largest, s->normal[i * n + i]);
+    }
+    for (int32_t i = 0; i < n; i++) {
+        s->normal[i * n + i] += damping * (s->normal[i * n + i] + 1e-3 * largest) + 1e-12 * largest;
+        s->step[i] = -s->gradient[i];
+    }
+    if (mhi_cholesky_factor(s->normal, n) != 0) {
+        return 0;
+    }
+    mhi_cholesky_solve(s->normal, n, s->step, 1);
+    double length = 0;
+    for (int32_t i = 0; i < n; i++) {
+        s->trial[i] = clip(&s->description->coordinates[i], q[i] + s->step[i]);
+        length = fmax(length, fabs(s->trial[i] - q[i]));
+    }
+    return length;
+}
+
+mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, double *rms,
+                             mhe_error *err) {
+    double damping = 1e-3, squares = 0;
+    int32_t n = 0;
+    for (int32_t i = 0; i < s->n_q; i++) {
+        q[i] = clip(&s->description->coordinates[i], q[i]);
+    }
+    for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
+        mhe_status status = distances(s, measured, q, 1, &squares, &n, err);
+        if (status != MHE_OK || n == 0) {
+            *rms = NAN;
+            return status;
+        }
+        const double length = propose(s, q, damping);
+        if (length < 1e-9) {
+            break;
+        }
+        double trial_squares = 0;
+        status = distances(s, measured, s->trial, 0, &trial_squares, &n, err);
+        if (status == MHE_OK && trial_squares <= squares) {
+            memcpy(q, s->trial, sizeof(double) * (size_t)s->n_q);
+            squares = trial_squares;
+            damping = fmax(damping / 5, 1e-9);
+        } else if (damping > 1e6) {
+            break;
+        } else {
+            damping *= 8;
+        }
+    }
+    *rms = sqrt(3 * squares / n); /* n counts single coordinates of markers */
+    return MHE_OK;
+}
+
+/* Fraction of a coordinate's range for posture p: a low-discrepancy sequence (additive recurrence
+ * with the square roots of successive integers), so that the same postures are tried everywhere. */
+static double spread(int32_t p, int32_t coordinate) {
+    const double x = p * sqrt(2.0 + coordinate) + 0.5;
+    return x - floor(x);
+}
+
+mhe_status mhi_start_search(mhi_start *s, const double *measured, double *q, double *rms,
+                            mhe_error *err) {
+    const size_t bytes = sizeof(double) * (size_t)s->n_q;
+    memcpy(s->best, q, bytes);
+    mhe_status status = mhi_start_posture(s, measured, s->best, rms, err);
+    double best = *rms;
+    for (int32_t p = 0; p < N_POSTURES && status == MHE_OK && best > 0.01; p++) {
+        for (int32_t i = 0; i < s->n_q; i++) {
+            const mhe_coordinate *c = &s->description->coordinates[i];
+            const double lower = isfinite(c->lower) ? c->lower : c->value - 1.5;
+            const double upper = isfinite(c->upper) ? c->upper : c->value + 1.5;
+            q[i] = lower + (upper - lower) * spread(p, i);
+        }
+        double found = 0;
+        status = mhi_start_posture(s, measured, q, &found, err);
+        if (status == MHE_OK && found < best) {
+            best = found;
+            memcpy(s->best, q, bytes);
+        }
+    }
+    memcpy(q, s->best, bytes);
+    *rms = best;
+    return status;
+}

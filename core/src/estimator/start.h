@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* start.h: a posture from markers alone (inverse kinematics), to start the first window from. */
+#ifndef MHI_START_H
+#define MHI_START_H
+
+#include "model/system.h"
+
+typedef struct mhi_start mhi_start;
+
+mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *context,
+                            mhi_start **start, mhe_error *err);
+void mhi_start_free(mhi_start *start);
+
+/* Least-squares posture q [n_q] within the coordinate ranges for markers [n_k x 3] (NaN: missing),
+ * by Levenberg-Marquardt from the given q. `*rms` [m] is the remaining distance per marker, NaN
+ * where no marker is there (q is then left as it was). */
+mhe_status mhi_start_posture(mhi_start *start, const double *markers, double *q, double *rms,
+                             mhe_error *err);
+
+/* The same from several postures spread over the ranges; the best one wins. */
+mhe_status mhi_start_search(mhi_start *start, const double *markers, double *q, double *rms,
+                            mhe_error *err);
+
+#endif
