@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* context.c: instances of the model and the memory of their contexts. */
+#include "context.h"
+
+#include <stdlib.h>
+
+mhe_status simbody_create(const mhe_host *host, const mhe_description *description,
+                          const void *config, void **self, mhe_error *err) {
+    (void)host;
+    const simbody_config *c = config;
+    simbody_model *model = calloc(1, sizeof *model);
+    if (model == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
+    }
+    model->dynamics = c->dynamics;
+    mhe_status status = tree_create(description, &model->tree, err);
+    if (status != MHE_OK) {
+        simbody_destroy(model);
+        return status;
+    }
+    *self = model;
+    return MHE_OK;
+}
+
+void simbody_destroy(void *self) {
+    simbody_model *model = self;
+    if (model != NULL) {
+        tree_free(model->tree);
+        free(model);
+    }
+}
+
+/* One block for all arrays of doubles. */
+static mhe_status context_allocate(simbody_context *c) {
+    size_t n = (size_t)c->tree->n_joints, n_q = (size_t)c->tree->n_q;
+    size_t n_m = (size_t)c->tree->n_muscles;
+    struct {
+        double **field;
+        size_t n;
+    } parts[] = {{&c->v, n_q},
+                 {&c->slopes, 4 * n},
+                 {&c->angle, n},
+                 {&c->speed, n},
+                 {&c->acceleration, n},
+                 {&c->torque, n},
+                 {&c->r, 9 * n},
+                 {&c->p, 3 * n},
+                 {&c->joint_mass, n * n},
+                 {&c->by_angle, n * n},
+                 {&c->by_speed, n * n},
+                 {&c->mass, n_q * n_q},
+                 {&c->factor, n_q * n_q},
+                 {&c->bias, n_q},
+                 {&c->rest, n_q},
+                 {&c->length_q, n_m * n_q}};
+    size_t total = 0;
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
+        total += parts[i].n;
+    }
+    c->memory = calloc(total, sizeof *c->memory);
+    c->links = calloc(n, sizeof *c->links);
+    c->steps = calloc((size_t)c->tree->max_chain + 1, sizeof *c->steps);
+    if (c->memory == NULL || c->links == NULL || c->steps == NULL) {
+        return MHE_E_MEMORY;
+    }
+    double *next = c->memory;
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
+        *parts[i].field = next;
+        next += parts[i].n;
+    }
+    return MHE_OK;
+}
+
+mhe_status simbody_context_create(const void *self, void **context, mhe_error *err) {
+    const simbody_model *model = self;
+    simbody_context *c = calloc(1, sizeof *c);
+    if (c == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for a context");
+    }
+    c->tree = model->tree;
+    c->dynamics = model->dynamics;
+    mhe_status status = context_allocate(c);
+    if (status != MHE_OK) {
+        (void)mhe_fail(err, status, "no memory for a context");
+        goto fail;
+    }
+    status = skeleton_create(c->tree, &c->skeleton, err);
+    if (status != MHE_OK) {
+        goto fail;
+    }
+    *context = c;
+    return MHE_OK;
+
+fail:
+    simbody_context_destroy(c);
+    return status;
+}
+
+void simbody_context_destroy(void *context) {
+    simbody_context *c = context;
+    if (c != NULL) {
+        skeleton_free(c->skeleton);
+        free(c->links);
+        free(c->steps);
+        free(c->memory);
+        free(c);
+    }
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* context.h: what one thread needs to evaluate a model. */
+#ifndef SIMBODY_CONTEXT_H
+#define SIMBODY_CONTEXT_H
+
+#include "dynamics.h"
+#include "model.h"
+#include "path.h"
+#include "skeleton.h"
+
+typedef struct simbody_model {
+    tree *tree;
+    int32_t dynamics; /* SIMBODY_DYNAMICS_* */
+} simbody_model;
+
+typedef struct simbody_context {
+    const tree *tree;
+    int32_t dynamics;
+    int32_t placed;     /* a state was set */
+    int32_t has_mass;   /* inertias and mass matrices are those of the state */
+    int32_t has_motion; /* velocities and bias are those of the state */
+    int32_t has_rates;
+    skeleton *skeleton;
+    link_motion *links; /* [n_joints] */
+    path_step *steps;
+    double *memory;                                /* all below */
+    double *v;                                     /* [n_q] */
+    double *slopes;                                /* [n_joints x 4] */
+    double *angle, *speed, *acceleration, *torque; /* [n_joints] */
+    double *r, *p;                                 /* links' placement */
+    double *joint_mass, *by_angle, *by_speed;      /* [n_joints x n_joints] */
+    double *mass, *factor;                         /* [n_q x n_q] */
+    double *bias, *rest;                           /* [n_q] */
+    double *length_q;                              /* [n_muscles x n_q] */
+} simbody_context;
+
+#endif

@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* dynamics.c: recursive inverse dynamics and its derivatives, in ground coordinates.
+ *
+ * Symbols: S axis, v velocity, a acceleration, I inertia, F composite force; parent p of link j.
+ * Turning joint j moves everything beyond it rigidly along S_j. Seen from a frame that is moved
+ * along, the links beyond j keep their places and axes, while the motion of j's parent changes by
+ *     v_p x S_j =: S'_j (axis_rate)        a_p x S_j,
+ * so that link i beyond j sees dv_i = S'_j, da_i = S''_j - v_i x S'_j with
+ *     S''_j = a_p x S_j + v_p x S'_j,
+ * and its force I a + v x* I v changes by I_i S''_j + B_i S'_j with
+ *     B_i x = v_i x* I_i x - I_i (v_i x x) + x x* I_i v_i     (rate).
+ * A change of the joint's speed gives dv_i = S_j, da_i = 2 S'_j - v_i x S_j, hence the force
+ * changes by 2 I_i S'_j + B_i S_j. Sums over the links beyond a joint are the composites. */
+#include "dynamics.h"
+
+#include "vector.h"
+
+#include <string.h>
+
+static const double no_motion[6];
+
+/* f = I v */
+static void inertia_times(const rigid_inertia *inertia, const double *v, double *f) {
+    double other[3];
+    rotate3(inertia->second, v, f);
+    cross3(inertia->first, v + 3, other);
+    for (int i = 0; i < 3; i++) {
+        f[i] += other[i];
+    }
+    cross3(v, inertia->first, other);
+    for (int i = 0; i < 3; i++) {
+        f[3 + i] = inertia->mass * v[3 + i] + other[i];
+    }
+}
+
+static void inertia_add(rigid_inertia *to, const rigid_inertia *from) {
+    to->mass += from->mass;
+    for (int i = 0; i < 3; i++) {
+        to->first[i] += from->first[i];
+    }
+    for (int i = 0; i < 9; i++) {
+        to->second[i] += from->second[i];
+    }
+}
+
+void dynamics_axes(const tree *t, const double *r, const double *p, link_motion *links) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        double *axis = links[i].axis;
+        int rotation = t->joints[i].kind == MHE_MOTION_ROTATION;
+        int column = rotation ? 2 : 0; /* the joint's axis in its link's frame */
+        double direction[3] = {r[9 * i + column], r[9 * i + 3 + column], r[9 * i + 6 + column]};
+        memset(axis, 0, sizeof links[i].axis);
+        memcpy(rotation ? axis : axis + 3, direction, sizeof direction);
+        if (rotation) {
+            cross3(p + 3 * i, direction, axis + 3);
+        }
+    }
+}
+
+void dynamics_inertias(const tree *t, const double *r, const double *p, link_motion *links) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        const tree_joint *joint = &t->joints[i];
+        rigid_inertia *own = &links[i].own;
+        memset(own, 0, sizeof *own);
+        if (joint->mass > 0) {
+            double com[3];
+            place3(r + 9 * i, p + 3 * i, joint->com, com);
+            own->mass = joint->mass;
+            for (int k = 0; k < 3; k++) {
+                own->first[k] = joint->mass * com[k];
+            }
+            congruence3(r + 9 * i, joint->inertia, own->second);
+            add_point_inertia(joint->mass, com, own->second);
+        }
+        links[i].composite = *own;
+    }
+    for (int32_t i = t->n_joints - 1; i >= 0; i--) {
+        int32_t parent = t->joints[i].parent;
+        if (parent >= 0) {
+            inertia_add(&links[parent].composite, &links[i].composite);
+        }
+    }
+}
+
+void dynamics_mass(const tree *t, const link_motion *links, double *mass) {
+    size_t n = (size_t)t->n_joints;
+    memset(mass, 0, n * n * sizeof *mass);
+    for (int32_t j = 0; j < t->n_joints; j++) {
+        double momentum[6];
+        inertia_times(&links[j].composite, links[j].axis, momentum);
+        for (int32_t i = j; i >= 0; i = t->joints[i].parent) {
+            double entry = dot6(links[i].axis, momentum);
+            mass[(size_t)i * n + (size_t)j] = entry;
+            mass[(size_t)j * n + (size_t)i] = entry;
+        }
+    }
+}
+
+void dynamics_velocities(const tree *t, const double *speed, link_motion *links) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        int32_t parent = t->joints[i].parent;
+        const double *base = parent < 0 ? no_motion : links[parent].velocity;
+        cross_motion(base, links[i].axis, links[i].axis_rate);
+        memcpy(links[i].velocity, base, sizeof links[i].velocity);
+        add6(links[i].velocity, speed[i], links[i].axis);
+    }
+}
+
+static void base_acceleration(const tree *t, const link_motion *links, int32_t i, double *a) {
+    int32_t parent = t->joints[i].parent;
+    if (parent >= 0) {
+        memcpy(a, links[parent].acceleration, sizeof links[parent].acceleration);
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        a[k] = 0;
+        a[3 + k] = -t->gravity[k];
+    }
+}
+
+void dynamics_inverse(const tree *t, const double *speed, const double *acceleration,
+                      link_motion *links, double *torque) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        link_motion *link = &links[i];
+        base_acceleration(t, links, i, link->acceleration);
+        add6(link->acceleration, acceleration[i], link->axis);
+        add6(link->acceleration, speed[i], link->axis_rate);
+        memset(link->force, 0, sizeof link->force);
+        if (link->own.mass > 0) {
+            double momentum[6], turning[6];
+            inertia_times(&link->own, link->velocity, momentum);
+            cross_force(link->velocity, momentum, turning);
+            inertia_times(&link->own, link->acceleration, link->force);
+            add6(link->force, 1, turning);
+        }
+    }
+    for (int32_t i = t->n_joints - 1; i >= 0; i--) {
+        torque[i] = dot6(links[i].axis, links[i].force);
+        if (t->joints[i].parent >= 0) {
+            add6(links[t->joints[i].parent].force, 1, links[i].force);
+        }
+    }
+}
+
+/* B of one link, row-major [6 x 6], column by column. */
+static void own_rate(const link_motion *link, double *rate) {
+    double momentum[6];
+    inertia_times(&link->own, link->velocity, momentum);
+    for (int k = 0; k < 6; k++) {
+        double x[6] = {0}, first[6], second[6], turned[6];
+        x[k] = 1;
+        inertia_times(&link->own, x, turned);
+        cross_force(link->velocity, turned, first);
+        cross_motion(link->velocity, x, turned);
+        inertia_times(&link->own, turned, second);
+        add6(first, -1, second);
+        cross_force(x, momentum, second);
+        for (int i = 0; i < 6; i++) {
+            rate[6 * i + k] = first[i] + second[i];
+        }
+    }
+}
+
+void dynamics_rates(const tree *t, link_motion *links) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        if (links[i].own.mass > 0) {
+            own_rate(&links[i], links[i].rate);
+        } else {
+            memset(links[i].rate, 0, sizeof links[i].rate);
+        }
+    }
+    for (int32_t i = t->n_joints - 1; i >= 0; i--) {
+        if (t->joints[i].parent >= 0) {
+            double *sum = links[t->joints[i].parent].rate;
+            for (int k = 0; k < 36; k++) {
+                sum[k] += links[i].rate[k];
+            }
+        }
+    }
+}
+
+/* out = I x + B y of the composite */
+static void composite_change(const link_motion *link, const double *x, const double *y,
+                             double *out) {
+    inertia_times(&link->composite, x, out);
+    for (int i = 0; i < 6; i++) {
+        out[i] += dot6(link->rate + 6 * i, y);
+    }
+}
+
+/* out = B^T x of the composite */
+static void composite_rate_transposed(const link_motion *link, const double *x, double *out) {
+    memset(out, 0, 6 * sizeof *out);
+    for (int i = 0; i < 6; i++) {
+        add6(out, x[i], link->rate + 6 * i);
+    }
+}
+
+/* S''_j */
+static void second_axis_rate(const tree *t, const link_motion *links, int32_t j, double *out) {
+    int32_t parent = t->joints[j].parent;
+    double base[6], turning[6];
+    base_acceleration(t, links, j, base);
+    cross_motion(base, links[j].axis, out);
+    cross_motion(parent < 0 ? no_motion : links[parent].velocity, links[j].axis_rate, turning);
+    add6(out, 1, turning);
+}
+
+void dynamics_derivatives(const tree *t, const link_motion *links, double *by_angle,
+                          double *by_speed) {
+    size_t n = (size_t)t->n_joints;
+    memset(by_angle, 0, n * n * sizeof *by_angle);
+    memset(by_speed, 0, n * n * sizeof *by_speed);
+    for (int32_t j = 0; j < t->n_joints; j++) {
+        const link_motion *link = &links[j];
+        double second[6], twice[6] = {0}, angle[6], speed[6], carried[6], inertia[6], rate[6];
+        second_axis_rate(t, links, j, second);
+        add6(twice, 2, link->axis_rate);
+        /* column j, rows of j and of the joints that carry it */
+        composite_change(link, second, link->axis_rate, angle);
+        composite_change(link, twice, link->axis, speed);
+        by_angle[(size_t)j * n + (size_t)j] = dot6(link->axis, angle);
+        by_speed[(size_t)j * n + (size_t)j] = dot6(link->axis, speed);
+        cross_force(link->axis, link->force, carried);
+        add6(angle, 1, carried); /* seen from ground, the force itself is moved along */
+        /* row j, columns of the joints that carry it */
+        inertia_times(&link->composite, link->axis, inertia);
+        composite_rate_transposed(link, link->axis, rate);
+        for (int32_t i = t->joints[j].parent; i >= 0; i = t->joints[i].parent) {
+            const link_motion *base = &links[i];
+            size_t above = (size_t)i * n + (size_t)j, below = (size_t)j * n + (size_t)i;
+            by_angle[above] = dot6(base->axis, angle);
+            by_speed[above] = dot6(base->axis, speed);
+            second_axis_rate(t, links, i, second);
+            by_angle[below] = dot6(inertia, second) + dot6(rate, base->axis_rate);
+            by_speed[below] = 2 * dot6(inertia, base->axis_rate) + dot6(rate, base->axis);
+        }
+    }
+}

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* model.h: the functions of the plugin's table; see mhe/model.h for what they promise. */
+#ifndef SIMBODY_MODEL_H
+#define SIMBODY_MODEL_H
+
+#include <mhe/model.h>
+
+#define SIMBODY_DYNAMICS_RECURSIVE 0
+#define SIMBODY_DYNAMICS_SIMBODY 1
+
+typedef struct simbody_config {
+    int32_t dynamics; /* SIMBODY_DYNAMICS_* */
+} simbody_config;
+
+mhe_status simbody_create(const mhe_host *host, const mhe_description *description,
+                          const void *config, void **self, mhe_error *err);
+void simbody_destroy(void *self);
+mhe_status simbody_context_create(const void *self, void **context, mhe_error *err);
+void simbody_context_destroy(void *context);
+mhe_status simbody_kinematics(void *context, const double *q, const double *v,
+                              const mhe_kinematics *out, mhe_error *err);
+mhe_status simbody_inverse_dynamics(void *context, const double *vdot, double *tau, double *tau_q,
+                                    double *tau_v, mhe_error *err);
+mhe_status simbody_forward_dynamics(void *context, const double *tau, double *vdot, mhe_error *err);
+
+#endif

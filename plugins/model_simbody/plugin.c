@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* plugin.c: tables of mhe.model.simbody. */
+#include "model.h"
+
+static const mhe_option simbody_options[] = {
+    MHE_OPT_ENUM(struct simbody_config, dynamics, "recursive", "recursive|simbody",
+                 "Who computes mass matrix and torques from Simbody's poses: the plugin's own "
+                 "recursion (faster) or Simbody; derivatives are the recursion's."),
+};
+
+static const mhe_model_ops simbody_ops = {
+    .size = sizeof simbody_ops,
+    .create = simbody_create,
+    .destroy = simbody_destroy,
+    .context_create = simbody_context_create,
+    .context_destroy = simbody_context_destroy,
+    .kinematics = simbody_kinematics,
+    .inverse_dynamics = simbody_inverse_dynamics,
+    .forward_dynamics = simbody_forward_dynamics,
+};
+
+static const mhe_plugin simbody_plugin = {
+    .size = sizeof simbody_plugin,
+    .flags = MHE_FLAG_HOT_ALLOCATES,
+    .id = "mhe.model.simbody",
+    .version = "0.1.0",
+    .summary = "Trees of rigid bodies by Simbody, with exact derivatives of dynamics and paths.",
+    .reference = "Sherman, Seth & Delp 2011, doi 10.1016/j.piutam.2011.04.023; derivatives: "
+                 "Carpentier & Mansard 2018, doi 10.15607/RSS.2018.XIV.038",
+    .iface = MHE_MODEL_IFACE,
+    .ops = &simbody_ops,
+    MHE_PLUGIN_OPTIONS(struct simbody_config, simbody_options)};
+
+MHE_PLUGIN_LIBRARY(&simbody_plugin)

@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* skeleton.h: a tree as a Simbody system. Each skeleton is a system and state of its own, so that
+ * skeletons on different threads share nothing. */
+#ifndef SIMBODY_SKELETON_H
+#define SIMBODY_SKELETON_H
+
+#include "tree.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct skeleton skeleton;
+
+/* `tree` must outlive the skeleton. [cold] */
+mhe_status skeleton_create(const tree *tree, skeleton **out, mhe_error *err);
+void skeleton_free(skeleton *skeleton); /* [cold] */
+
+/* Sets the joints to `angle` [n_joints] (rad or m) and writes the links' placement in ground: r
+ * [n_joints x 9], p [n_joints x 3]. [hot] */
+mhe_status skeleton_place(skeleton *skeleton, const double *angle, double *r, double *p,
+                          mhe_error *err);
+
+/* At the angles placed last: joint torques `torque` [n_joints] that give `acceleration` at `speed`
+ * against gravity, and mass matrix M [n_joints x n_joints]; NULL: not wanted. [hot] */
+mhe_status skeleton_dynamics(skeleton *skeleton, const double *speed, const double *acceleration,
+                             double *torque, double *mass, mhe_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* tree_check.c: refuses descriptions that cannot be a tree of rigid bodies. */
+#include "tree.h"
+
+#include "vector.h"
+
+#include <math.h>
+
+static int all_finite(const double *values, int32_t n) {
+    double sum = 0;
+    for (int32_t i = 0; i < n; i++) {
+        sum += values[i] * 0.0;
+    }
+    return sum == 0;
+}
+
+static int is_rotation(const double *r) {
+    double product[9], determinant[3];
+    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+    congruence3(r, unit, product);
+    for (int i = 0; i < 9; i++) {
+        if (!(fabs(product[i] - unit[i]) < 1e-3)) { /* files round to as few as four digits */
+            return 0;
+        }
+    }
+    cross3(r, r + 3, determinant);
+    return dot3(determinant, r + 6) > 0;
+}
+
+static mhe_status check_motion(const mhe_motion *motion, int32_t n_coordinates, const char *body,
+                               mhe_error *err) {
+    if (motion->coordinate < -1 || motion->coordinate >= n_coordinates) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "body '%s': a motion of coordinate %d, which is not there", body,
+                        (int)motion->coordinate);
+    }
+    if (motion->kind != MHE_MOTION_ROTATION && motion->kind != MHE_MOTION_TRANSLATION) {
+        return mhe_fail(err, MHE_E_INPUT, "body '%s': a motion of unknown kind %d", body,
+                        (int)motion->kind);
+    }
+    if (!(fabs(dot3(motion->axis, motion->axis) - 1) < 1e-6)) {
+        return mhe_fail(err, MHE_E_INPUT, "body '%s': a motion's axis is not a unit vector", body);
+    }
+    const mhe_function *f = &motion->function;
+    if (f->n_pieces < 1 || !all_finite(f->coef, 4 * f->n_pieces) ||
+        !all_finite(f->origin, f->n_pieces)) {
+        return mhe_fail(err, MHE_E_INPUT, "body '%s': a motion's function is not finite", body);
+    }
+    return MHE_OK;
+}
+
+static mhe_status check_body(const mhe_description *d, int32_t i, mhe_error *err) {
+    const mhe_body *body = &d->bodies[i];
+    if (body->parent < -1 || body->parent >= i) {
+        return mhe_fail(err, MHE_E_INPUT, "body '%s': its parent is not listed before it",
+                        body->name);
+    }
+    if (!is_rotation(body->joint_r) || !is_rotation(body->body_r) ||
+        !all_finite(body->joint_p, 3) || !all_finite(body->body_p, 3)) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "body '%s': a frame of its joint is not a rigid placement", body->name);
+    }
+    if (!(body->mass >= 0) || !all_finite(&body->mass, 1)) {
+        return mhe_fail(err, MHE_E_INPUT, "body '%s': mass %g kg is not a finite number >= 0",
+                        body->name, body->mass);
+    }
+    if (!all_finite(body->com, 3) || !all_finite(body->inertia, 9)) {
+        return mhe_fail(err, MHE_E_INPUT, "body '%s': centre of mass or inertia is not finite",
+                        body->name);
+    }
+    for (int k = 0; k < 3; k++) {
+        if (!(body->inertia[4 * k] >= 0)) {
+            return mhe_fail(err, MHE_E_INPUT, "body '%s': a moment of inertia is negative",
+                            body->name);
+        }
+    }
+    for (int32_t k = 0; k < body->n_motions; k++) {
+        mhe_status status = check_motion(&body->motions[k], d->n_coordinates, body->name, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
+    return MHE_OK;
+}
+
+static int is_place(const mhe_description *d, int32_t body, const double *location) {
+    return body >= -1 && body < d->n_bodies && all_finite(location, 3);
+}
+
+mhe_status tree_check_description(const mhe_description *d, mhe_error *err) {
+    if (!all_finite(d->gravity, 3)) {
+        return mhe_fail(err, MHE_E_INPUT, "gravity is not finite");
+    }
+    for (int32_t i = 0; i < d->n_bodies; i++) {
+        mhe_status status = check_body(d, i, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
+    for (int32_t i = 0; i < d->n_markers; i++) {
+        if (!is_place(d, d->markers[i].body, d->markers[i].location)) {
+            return mhe_fail(err, MHE_E_INPUT, "marker '%s': its body or location is not valid",
+                            d->markers[i].name);
+        }
+    }
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        const mhe_muscle *m = &d->muscles[i];
+        int valid = m->n_points >= 2;
+        for (int32_t k = 0; k < m->n_points; k++) {
+            valid = valid && is_place(d, m->points[k].body, m->points[k].location);
+        }
+        if (!valid) {
+            return mhe_fail(err, MHE_E_INPUT, "muscle '%s': its path is not valid", m->name);
+        }
+    }
+    return MHE_OK;
+}
+
+mhe_status tree_check_mass(const tree *t, const mhe_description *d, mhe_error *err) {
+    if (t->n_q < 1) {
+        return mhe_fail(err, MHE_E_INPUT, "the model has no coordinate");
+    }
+    for (int32_t c = 0; c < t->n_q; c++) {
+        int moves_mass = 0;
+        for (int32_t i = 0; i < t->n_joints && !moves_mass; i++) {
+            for (int32_t up = i; up >= 0 && t->joints[i].mass > 0; up = t->joints[up].parent) {
+                moves_mass |= t->joints[up].coordinate == c;
+            }
+        }
+        if (!moves_mass) {
+            return mhe_fail(err, MHE_E_INPUT, "coordinate '%s' moves no mass",
+                            d->coordinates[c].name);
+        }
+    }
+    return MHE_OK;
+}
