@@ -231,8 +231,8 @@ void mhe_estimator_close(mhe_estimator *e) {
     free(e);
 }
 
-const mhe_description *mhi_estimator_description(const mhe_estimator *e) {
-    return e->description;
+const mhi_system *mhi_estimator_system(const mhe_estimator *e) {
+    return e->system;
 }
 
 mhi_ocp *mhi_estimator_ocp(mhe_estimator *e) {
@@ -240,6 +240,9 @@ mhi_ocp *mhi_estimator_ocp(mhe_estimator *e) {
 }
 
 void mhi_estimator_set_start(mhe_estimator *e, const double *q, const double *qdot) {
+    if (e->start_known) {
+        return;
+    }
     memcpy(e->start_q, q, sizeof(double) * (size_t)e->n_q);
     memmove(e->start_v, qdot, sizeof(double) * (size_t)e->n_q);
     e->start_known = 1;

@@ -4,9 +4,8 @@
 #define MHI_ESTIMATOR_PRIVATE_H
 
 #include "base/arena.h"
-#include "config/run.h"
+#include "estimator/create.h"
 #include "estimator/start.h"
-#include "ocp/ocp.h"
 
 #include <mhe/estimator.h>
 
@@ -48,14 +47,6 @@ struct mhe_estimator {
     double *out_q, *out_v;
     mhi_arena arena;
 };
-
-/* An estimator on a run description, which must outlive it. [cold] */
-mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
-                                mhe_error *err);
-const mhe_description *mhi_estimator_description(const mhe_estimator *estimator);
-mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
-/* First state from outside the config (a reference); q, qdot [n_q]. Before the first push. */
-void mhi_estimator_set_start(mhe_estimator *estimator, const double *q, const double *qdot);
 
 /* window.c */
 void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg);

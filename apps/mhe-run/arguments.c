@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "arguments.h"
+
+#include "base/text.h"
+#include "plugin/registry.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+const char arguments_help[] =
+    "Estimates joint angles, activations and muscle forces from markers and EMG.\n"
+    "\n"
+    "  mhe-run CONFIG.yaml [--out DIR] [--set path.to.key=value]... [--quiet]\n"
+    "  mhe-run --check CONFIG.yaml [--set path.to.key=value]...\n"
+    "  mhe-run --list-plugins [--json]\n"
+    "  mhe-run --describe ID [--json | --markdown]\n"
+    "  mhe-run --version | --help\n"
+    "\n"
+    "Results go to DIR, ./out/<config name> unless given. Exit status: 0 done; 1 the run failed or "
+    "was\n"
+    "interrupted; 2 the command line, the configuration or an input file is wrong.\n";
+
+static const char *const words[] = {"--out",          "--set",  "--quiet",    "--check",
+                                    "--list-plugins", "--json", "--markdown", "--describe",
+                                    "--version",      "--help"};
+
+/* The word behind an option. */
+static mhe_status value_of(int argc, char **argv, int *i, const char **value, mhe_error *err) {
+    if (*i + 1 >= argc) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", argv[*i]);
+    }
+    *value = argv[++*i];
+    return MHE_OK;
+}
+
+static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_error *err) {
+    const char *word = argv[*i];
+    if (strcmp(word, "--out") == 0) {
+        return value_of(argc, argv, i, &a->out, err);
+    }
+    if (strcmp(word, "--set") == 0) {
+        return value_of(argc, argv, i, &a->set[a->n_set++], err);
+    }
+    if (strcmp(word, "--check") == 0) {
+        a->mode = MODE_CHECK;
+        return value_of(argc, argv, i, &a->config, err);
+    }
+    if (strcmp(word, "--describe") == 0) {
+        a->mode = MODE_DESCRIBE;
+        return value_of(argc, argv, i, &a->id, err);
+    }
+    if (strcmp(word, "--quiet") == 0) {
+        a->quiet = 1;
+    } else if (strcmp(word, "--list-plugins") == 0) {
+        a->mode = MODE_LIST;
+    } else if (strcmp(word, "--json") == 0) {
+        a->format = MHI_FORMAT_JSON;
+    } else if (strcmp(word, "--markdown") == 0) {
+        a->format = MHI_FORMAT_MARKDOWN;
+    } else if (strcmp(word, "--version") == 0) {
+        a->mode = MODE_VERSION;
+    } else if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) {
+        a->mode = MODE_HELP;
+    } else if (word[0] == '-' && word[1] != '\0') {
+        char hint[256];
+        return mhe_fail(
+            err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
+            mhi_suggest(hint, sizeof hint, word, words, sizeof words / sizeof words[0]));
+    } else if (a->config != NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "one config file at a time: '%s' and '%s'", a->config,
+                        word);
+    } else {
+        a->config = word;
+    }
+    return MHE_OK;
+}
+
+mhe_status arguments_parse(int argc, char **argv, arguments *a, mhe_error *err) {
+    *a = (arguments){0};
+    a->set = calloc((size_t)argc, sizeof *a->set);
+    if (a->set == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int i = 1; i < argc; i++) {
+        mhe_status status = take_word(argc, argv, &i, a, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
+    if ((a->mode == MODE_RUN || a->mode == MODE_CHECK) && a->config == NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT,
+                        "no config file is given; 'mhe-run --help' shows the usage");
+    }
+    return MHE_OK;
+}

@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe-run: estimates joint angles, activations and muscle forces; asks plugins what they are. */
+#include "arguments.h"
+#include "base/text.h"
+#include "track.h"
+
+#include <mhe/version.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+static void log_line(const mhe_host *host, int32_t level, const char *text) {
+    (void)host;
+    static const char *const names[] = {"error", "warning", "note", "debug"};
+    if (level <= MHE_LOG_WARNING) {
+        (void)fprintf(stderr, "mhe-run: %s: %s\n", names[level], text);
+    }
+}
+
+static const void *service(const mhe_host *host, const char *id) {
+    (void)host, (void)id;
+    return NULL;
+}
+
+static int exit_status(mhe_status status) {
+    switch (status) {
+    case MHE_OK:
+        return 0;
+    case MHE_E_ARGUMENT:
+    case MHE_E_CONFIG:
+    case MHE_E_INPUT:
+    case MHE_E_PLUGIN:
+    case MHE_E_UNSUPPORTED:
+        return 2;
+    default:
+        return 1;
+    }
+}
+
+/* Prints a text that a library function made. */
+static mhe_status print(mhi_text *text, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    if (text->failed || (text->data != NULL && fputs(text->data, stdout) == EOF)) {
+        status = mhe_fail(err, MHE_E_IO, "the output could not be written");
+    }
+    mhi_text_free(text);
+    return status;
+}
+
+static mhe_status show_plugins(const arguments *a, mhi_registry *registry, mhe_error *err) {
+    mhi_text text = {0};
+    if (a->mode == MODE_LIST) {
+        mhi_registry_list(registry, a->format, &text);
+        return print(&text, err);
+    }
+    mhe_status status = mhi_registry_describe(registry, a->id, a->format, &text, err);
+    if (status != MHE_OK) {
+        mhi_text_free(&text);
+        return status;
+    }
+    return print(&text, err);
+}
+
+static mhe_status run_config(const arguments *a, const mhe_host *host, mhi_registry *registry,
+                             mhe_error *err) {
+    mhi_run *run = NULL;
+    mhe_status status = mhi_run_read(a->config, a->set, a->n_set, registry, &run, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    char folder[4096];
+    int length = a->out != NULL ? snprintf(folder, sizeof folder, "%s", a->out)
+                                : snprintf(folder, sizeof folder, "out/%s", run->name);
+    if (length < 0 || (size_t)length >= sizeof folder) {
+        status = mhe_fail(err, MHE_E_ARGUMENT, "the path of the output folder is too long");
+    } else {
+        const track_setup setup = {run, host, folder, a->quiet, a->mode == MODE_CHECK};
+        status = track(&setup, err);
+    }
+    if (status == MHE_OK && a->mode == MODE_CHECK) {
+        (void)printf("%s: ok\n", a->config);
+    }
+    mhi_run_free(run);
+    return status;
+}
+
+int main(int argc, char **argv) {
+    const mhe_host host = {.size = sizeof host, .log = log_line, .service = service};
+    arguments a;
+    mhe_error err = {0};
+    mhi_registry *registry = NULL;
+    mhe_status status = arguments_parse(argc, argv, &a, &err);
+    if (status == MHE_OK && a.mode == MODE_HELP) {
+        (void)fputs(arguments_help, stdout);
+    } else if (status == MHE_OK && a.mode == MODE_VERSION) {
+        (void)printf("mhe-run %s\n", MHE_VERSION);
+    } else if (status == MHE_OK) {
+        status = mhi_registry_create(&host, &registry, &err);
+        if (status == MHE_OK) {
+            status = a.mode == MODE_LIST || a.mode == MODE_DESCRIBE
+                         ? show_plugins(&a, registry, &err)
+                         : run_config(&a, &host, registry, &err);
+        }
+    }
+    if (status != MHE_OK) {
+        (void)fprintf(stderr, "mhe-run: %s\n", err.text);
+    }
+    mhi_registry_free(registry);
+    free(a.set);
+    return exit_status(status);
+}

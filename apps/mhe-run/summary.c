@@ -1,0 +1,136 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "summary.h"
+
+#include <cJSON.h>
+#include <math.h>
+#include <mhe/version.h>
+#include <stdlib.h>
+#include <sys/resource.h>
+
+mhe_status summary_add(summary *s, const mhe_estimate *estimate, mhe_error *err) {
+    if (s->n_solves == s->capacity) {
+        const int32_t capacity = s->capacity == 0 ? 1024 : 2 * s->capacity;
+        double *grown = realloc(s->solve_ms, sizeof(double) * (size_t)capacity);
+        if (grown == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+        s->solve_ms = grown;
+        s->capacity = capacity;
+    }
+    s->solve_ms[s->n_solves++] = 1e3 * estimate->solve_time;
+    s->n_converged += estimate->status == MHE_FRAME_OK;
+    s->iterations_sum += estimate->iterations;
+    if (estimate->iterations > s->iterations_max) {
+        s->iterations_max = estimate->iterations;
+    }
+    return MHE_OK;
+}
+
+void summary_free(summary *s) {
+    free(s->solve_ms);
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Nearest-rank percentile of the sorted solve times, ms. */
+static double percentile(const summary *s, double fraction) {
+    const int32_t rank = (int32_t)ceil(fraction * s->n_solves);
+    return s->n_solves == 0 ? NAN : s->solve_ms[rank < 1 ? 0 : rank - 1];
+}
+
+static double mean_ms(const summary *s) {
+    double sum = 0;
+    for (int32_t i = 0; i < s->n_solves; i++) {
+        sum += s->solve_ms[i];
+    }
+    return s->n_solves == 0 ? NAN : sum / s->n_solves;
+}
+
+static double peak_rss_mb(void) {
+    struct rusage usage;
+    getrusage(RUSAGE_SELF, &usage);
+    return (double)usage.ru_maxrss / 1024;
+}
+
+/* cJSON writes NaN as null, which is what "not known" is in JSON. */
+static void add_number(cJSON *object, const char *key, double value) {
+    cJSON_AddNumberToObject(object, key, value);
+}
+
+static void add_rmse(cJSON *root, const mhi_rmse *rmse) {
+    const double degrees = 180 / acos(-1);
+    cJSON *o = cJSON_AddObjectToObject(root, "rmse");
+    add_number(o, "q_deg", degrees * rmse->q);
+    add_number(o, "qdot_rad_s", rmse->qdot);
+    add_number(o, "activation", rmse->activation);
+    add_number(o, "excitation", rmse->excitation);
+    add_number(o, "force_n", rmse->force);
+    add_number(o, "marker_mm", 1e3 * rmse->marker);
+}
+
+static void add_times(cJSON *root, const summary *s) {
+    cJSON *rate = cJSON_AddObjectToObject(root, "rate_hz");
+    add_number(rate, "mean", 1e3 / mean_ms(s));
+    cJSON *ms = cJSON_AddObjectToObject(root, "solve_ms");
+    add_number(ms, "mean", mean_ms(s));
+    add_number(ms, "p50", percentile(s, 0.5));
+    add_number(ms, "p95", percentile(s, 0.95));
+    add_number(ms, "p99", percentile(s, 0.99));
+    add_number(ms, "max", percentile(s, 1));
+}
+
+mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
+    qsort(s->solve_ms, (size_t)s->n_solves, sizeof(double), by_value);
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "version", MHE_VERSION);
+    cJSON_AddStringToObject(root, "config", config);
+    cJSON *model = cJSON_AddObjectToObject(root, "model");
+    add_number(model, "nq", s->info.n_q);
+    add_number(model, "nmuscles", s->info.n_muscles);
+    add_number(model, "nmarkers", s->info.n_markers);
+    cJSON_AddStringToObject(root, "formulation",
+                            s->info.formulation == 0 ? "excitation" : "activation");
+    add_number(root, "n_window", s->info.window);
+    add_number(root, "ratio", s->info.ratio);
+    cJSON_AddStringToObject(root, "solver", s->info.solver);
+    add_number(root, "frames", s->n_pushed);
+    add_number(root, "solves", s->n_solves);
+    add_number(root, "converged", s->n_solves == 0 ? NAN : (double)s->n_converged / s->n_solves);
+    add_times(root, s);
+    cJSON *iterations = cJSON_AddObjectToObject(root, "iterations");
+    add_number(iterations, "mean", s->n_solves == 0 ? NAN : s->iterations_sum / s->n_solves);
+    add_number(iterations, "max", s->iterations_max);
+    add_number(root, "deadline_misses", 0);
+    add_number(root, "peak_rss_mb", peak_rss_mb());
+    if (s->has_rmse) {
+        add_rmse(root, &s->rmse);
+    }
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (text == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhi_text_add(out, "%s\n", text);
+    cJSON_free(text);
+    return MHE_OK;
+}
+
+void summary_lines(const summary *s, mhi_text *out) {
+    mhi_text_add(out, "%d frames, %d solves, %.2f %% converged\n", s->n_pushed, s->n_solves,
+                 s->n_solves == 0 ? 0.0 : 100.0 * s->n_converged / s->n_solves);
+    if (s->n_solves > 0) {
+        mhi_text_add(out, "rate %.1f Hz mean; solve %.2f ms median, %.2f ms p99, %.2f ms max\n",
+                     1e3 / mean_ms(s), percentile(s, 0.5), percentile(s, 0.99), percentile(s, 1));
+    }
+    if (s->has_rmse) {
+        const double degrees = 180 / acos(-1);
+        mhi_text_add(
+            out,
+            "error against the reference (RMSE): joint angles %.4g deg, muscle forces %.4g N, "
+            "markers %.4g mm\n",
+            degrees * s->rmse.q, s->rmse.force, 1e3 * s->rmse.marker);
+    }
+}

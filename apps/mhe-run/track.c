@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "track.h"
+
+#include "estimator/create.h"
+#include "picture.h"
+#include "progress.h"
+#include "results.h"
+#include "summary.h"
+
+#include <math.h>
+#include <signal.h>
+#include <string.h>
+
+static volatile sig_atomic_t interrupted;
+
+static void on_interrupt(int signal_number) {
+    (void)signal_number;
+    interrupted = 1;
+}
+
+typedef struct tracking {
+    const track_setup *setup;
+    mhe_estimator *estimator;
+    mhi_recording *recording;
+    mhi_errors *errors;
+    mhi_outbox *outbox;
+    results *results;
+    summary summary;
+} tracking;
+
+/* The first state from the reference, where the config gives none and the reference knows it. */
+static void start_from_reference(tracking *t) {
+    const mhi_reference *r = &t->recording->reference;
+    if (!r->present) {
+        return;
+    }
+    for (int32_t i = 0; i < t->summary.info.n_q; i++) {
+        if (isnan(r->q[i]) || isnan(r->qdot[i])) {
+            return;
+        }
+    }
+    mhi_estimator_set_start(t->estimator, r->q, r->qdot);
+}
+
+static mhe_status open_all(tracking *t, mhe_error *err) {
+    const track_setup *s = t->setup;
+    mhe_status status = mhi_estimator_create(s->run, s->host, &t->estimator, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    const mhi_system *system = mhi_estimator_system(t->estimator);
+    mhe_estimator_describe(t->estimator, &t->summary.info);
+    status =
+        mhi_recording_read(s->run, mhi_system_description(system), s->host, &t->recording, err);
+    if (status == MHE_OK && t->recording->reference.present) {
+        start_from_reference(t);
+        status = mhi_errors_create(system, t->recording, &t->errors, err);
+    }
+    if (status == MHE_OK && !s->check_only) {
+        t->summary.n_frames = t->recording->n_frames;
+        status = mhi_outbox_open(s->out, &t->outbox, err);
+    }
+    if (status == MHE_OK && !s->check_only) {
+        status = results_open(t->outbox, &t->summary.info, t->recording, &t->results, err);
+    }
+    return status;
+}
+
+static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_error *err) {
+    mhe_status status = results_write(t->results, estimate, err);
+    if (status == MHE_OK) {
+        status = summary_add(&t->summary, estimate, err);
+    }
+    if (status == MHE_OK && t->errors != NULL) {
+        status = mhi_errors_add(t->errors, estimate, err);
+    }
+    return status;
+}
+
+static mhe_status estimate_all(tracking *t, mhe_error *err) {
+    const mhi_recording *r = t->recording;
+    const mhe_estimator_info *info = &t->summary.info;
+    progress bar;
+    progress_start(&bar, r->n_frames, t->setup->quiet);
+    mhe_status status = MHE_OK;
+    for (int32_t k = 0; k < r->n_frames && status == MHE_OK && !interrupted; k++) {
+        const mhe_frame frame = {
+            .size = sizeof frame,
+            .time = r->time[k],
+            .markers = r->markers == NULL ? NULL : r->markers + (ptrdiff_t)k * 3 * info->n_markers,
+            .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * info->n_muscles};
+        mhe_estimate estimate = {.size = sizeof estimate};
+        int32_t ready = 0;
+        status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
+        if (status == MHE_OK && ready) {
+            status = take_estimate(t, &estimate, err);
+        }
+        t->summary.n_pushed = k + 1;
+        progress_update(&bar, k + 1, t->summary.n_solves, t->summary.n_converged);
+    }
+    t->summary.elapsed = progress_seconds() - bar.begin;
+    progress_end(&bar);
+    return status;
+}
+
+static mhe_status write_texts(tracking *t, mhe_error *err) {
+    const mhi_run *run = t->setup->run;
+    mhi_text text = {0};
+    if (t->errors != NULL) {
+        t->summary.has_rmse = 1;
+        mhi_errors_rmse(t->errors, run->output.skip_first, run->output.skip_last, &t->summary.rmse);
+    }
+    mhi_run_write(run, &text);
+    mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                    : mhi_outbox_text(t->outbox, "config.yaml", text.data, err);
+    mhi_text_free(&text);
+    if (status == MHE_OK) {
+        status = summary_json(&t->summary, run->path, &text, err);
+    }
+    if (status == MHE_OK) {
+        status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                             : mhi_outbox_text(t->outbox, "summary.json", text.data, err);
+    }
+    mhi_text_free(&text);
+    return status;
+}
+
+static void draw(tracking *t) {
+    const mhi_run *run = t->setup->run;
+    mhe_error why = {0};
+    if (!run->output.picture) {
+        return;
+    }
+    mhe_status status = picture_estimates(t->setup->out, run->data.reference, &why);
+    if (status != MHE_OK) {
+        t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
+    }
+}
+
+static void tell(const tracking *t) {
+    mhi_text text = {0};
+    summary_lines(&t->summary, &text);
+    mhi_text_add(&text, "results in %s\n", t->setup->out);
+    if (!text.failed) {
+        (void)fputs(text.data, stdout);
+    }
+    mhi_text_free(&text);
+}
+
+static mhe_status finish(tracking *t, mhe_error *err) {
+    if (t->summary.n_solves == 0) {
+        return mhe_fail(err, MHE_E_INTERRUPTED,
+                        "interrupted before the first estimate; nothing is written");
+    }
+    mhe_status status = write_texts(t, err);
+    if (status == MHE_OK) {
+        status = mhi_outbox_commit(t->outbox, err);
+    }
+    if (status != MHE_OK) {
+        return status;
+    }
+    draw(t);
+    tell(t);
+    if (interrupted) {
+        return mhe_fail(
+            err, MHE_E_INTERRUPTED,
+            "interrupted after %d of %d frames; the files hold what was estimated until then",
+            t->summary.n_pushed, t->summary.n_frames);
+    }
+    return MHE_OK;
+}
+
+mhe_status track(const track_setup *setup, mhe_error *err) {
+    tracking t = {.setup = setup};
+    struct sigaction action, before;
+    memset(&action, 0, sizeof action);
+    action.sa_handler = on_interrupt;
+    mhe_status status = open_all(&t, err);
+    if (status == MHE_OK && !setup->check_only) {
+        (void)sigaction(SIGINT, &action, &before);
+        status = estimate_all(&t, err);
+        if (status == MHE_OK) {
+            status = finish(&t, err);
+        }
+        (void)sigaction(SIGINT, &before, NULL);
+    }
+    results_close(t.results);
+    mhi_outbox_close(t.outbox);
+    mhi_errors_free(t.errors);
+    mhi_recording_free(t.recording);
+    mhe_estimator_close(t.estimator);
+    summary_free(&t.summary);
+    return status;
+}

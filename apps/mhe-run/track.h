@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* track.h: a whole run: recording in, result files out. */
+#ifndef TRACK_H
+#define TRACK_H
+
+#include "config/run.h"
+
+typedef struct track_setup {
+    const mhi_run *run;
+    const mhe_host *host;
+    const char *out; /* folder */
+    int quiet;
+    int check_only; /* open everything, estimate nothing */
+} track_setup;
+
+/* MHE_E_INTERRUPTED: Ctrl-C; the files hold what was estimated until then. On any other failure no
+ * file appears. */
+mhe_status track(const track_setup *setup, mhe_error *err);
+
+#endif

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* create.h: an estimator on a run description that the caller keeps, and its parts, for the
+ * programs. */
+#ifndef MHI_CREATE_H
+#define MHI_CREATE_H
+
+#include "config/run.h"
+#include "ocp/ocp.h"
+
+#include <mhe/estimator.h>
+
+/* `run` and `host` must outlive it. [cold] */
+mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
+                                mhe_error *err);
+const mhi_system *mhi_estimator_system(const mhe_estimator *estimator);
+mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
+/* First state from outside the config (a reference); q, qdot [n_q], before the first push. What the
+ * config itself gives is kept. */
+void mhi_estimator_set_start(mhe_estimator *estimator, const double *q, const double *qdot);
+
+#endif
