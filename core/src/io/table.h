@@ -9,12 +9,13 @@
 typedef struct mhi_table {
     char *path;                /* for messages */
     int32_t n_rows, n_columns; /* columns without time */
-    char **labels;             /* [n_columns] */
+    int32_t n_labels;          /* n_columns; in a .trc n_columns / 3 */
+    char **labels;             /* [n_labels], no two the same */
     double *time;              /* [n_rows], s, strictly increasing, finite */
     double *values;     /* [n_rows x n_columns], row-major; as in the file, angles and lengths not
                            converted ... */
     int32_t in_degrees; /* ... the .sto header says inDegrees=yes */
-    double rate;        /* Hz: from the header or the median step */
+    double rate;        /* Hz: from the header or the median step; 0 for one row without either */
     double unit;        /* .trc: metres per unit of the file (already applied to values); else 1 */
     char unit_name[8];  /* .trc: "mm", "cm", "m" */
     char **warnings;    /* what was repaired or skipped: one line each with file:line */
@@ -34,5 +35,15 @@ mhe_status mhi_sto_parse(const char *name, const char *text, size_t length, mhi_
 mhe_status mhi_trc_parse(const char *name, const char *text, size_t length, mhi_table **table,
                          mhe_error *err);
 void mhi_table_free(mhi_table *table);
+
+/* Position in `labels` of what a model calls `name`, or -1. In this order:
+ *   the same text;
+ *   the same behind a subject ("Anna:STER" for "STER") or a component path ("/forceset/BRA");
+ *   of the same quantity written in another way. A label may state one: q, qdot, a, e or F before
+ *     '.' or '_' ("a.BRA", "F_BRA"), or OpenSim's value, speed, activation, excitation or
+ *     tendon_force behind the path ("/jointset/elbow/elbow_flexion/value");
+ *   where `name` states no quantity: its q, else the only column about it.
+ * Two columns that fit equally well are none. [any] */
+int32_t mhi_table_find(const mhi_table *table, const char *name);
 
 #endif

@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* .trc: marker trajectories as Motion Analysis, Vicon, Mokka and OpenSim write them. */
+#include "io/table_reader.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What the header says; -1: nothing. */
+typedef struct trc_header {
+    int32_t n_frames, n_markers;
+} trc_header;
+
+static const struct {
+    const char *written, *name;
+    double metres;
+} units[] = {{"mm", "mm", 1e-3},          {"cm", "cm", 1e-2},          {"m", "m", 1},
+             {"millimeters", "mm", 1e-3}, {"centimeters", "cm", 1e-2}, {"meters", "m", 1},
+             {"millimetres", "mm", 1e-3}, {"centimetres", "cm", 1e-2}, {"metres", "m", 1}};
+
+static mhe_status take_unit(mhi_table_reader *reader, mhi_cell value) {
+    mhi_table *table = reader->table;
+    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
+        if (mhi_cell_is(value, units[i].written)) {
+            table->unit = units[i].metres;
+            (void)strcpy(table->unit_name, units[i].name);
+            return MHE_OK;
+        }
+    }
+    char shown[MHI_SHOWN];
+    return mhi_table_fail(reader, "Units '%s' is none of mm, cm, m", mhi_cell_show(shown, value));
+}
+
+/* Drops empty cells, as double tabs and tabs at the end leave them. */
+static mhe_status split_words(mhi_table_reader *reader) {
+    int32_t tabs = memchr(reader->line.text, '\t', reader->line.length) != NULL;
+    mhe_status status = mhi_table_split(reader, tabs ? '\t' : ' ');
+    int32_t n = 0;
+    for (int32_t i = 0; i < reader->n_cells && status == MHE_OK; i++) {
+        if (reader->cells[i].length > 0) {
+            reader->cells[n++] = reader->cells[i];
+        }
+    }
+    reader->n_cells = n;
+    return status;
+}
+
+static mhe_status next_words(mhi_table_reader *reader, const char *wanted) {
+    return mhi_table_next(reader) ? split_words(reader)
+                                  : mhi_table_fail(reader, "the file ends before %s", wanted);
+}
+
+/* One key of line 2 with its value of line 3; keys not named here do not matter to us. */
+static mhe_status take_key(mhi_table_reader *reader, mhi_cell key, mhi_cell value,
+                           trc_header *header) {
+    double number = -1;
+    int32_t is_number = mhi_number(value, &number);
+    if (mhi_cell_is(key, "Units")) {
+        return take_unit(reader, value);
+    }
+    if (mhi_cell_is(key, "DataRate") && is_number && number > 0) {
+        reader->table->rate = number;
+    } else if (mhi_cell_is(key, "NumFrames") && is_number && number >= 0 && number < 1e9) {
+        header->n_frames = (int32_t)number;
+    } else if (mhi_cell_is(key, "NumMarkers") && is_number && number >= 0 && number < 1e9) {
+        header->n_markers = (int32_t)number;
+    }
+    return MHE_OK;
+}
+
+#define KEYS_MAX 16 /* there are 8 */
+
+/* Lines 1 to 3. */
+static mhe_status read_header(mhi_table_reader *reader, trc_header *header) {
+    static const char first[] = "PathFileType";
+    mhe_status status = next_words(reader, "its first line (PathFileType 4 (X/Y/Z) name)");
+    if (status == MHE_OK && (reader->line.length < sizeof first - 1 ||
+                             memcmp(reader->line.text, first, sizeof first - 1) != 0)) {
+        return mhi_table_fail(reader, "a .trc file must begin with 'PathFileType'");
+    }
+    mhi_cell keys[KEYS_MAX];
+    int32_t n_keys = 0;
+    if (status == MHE_OK && (status = next_words(reader, "the header's keys")) == MHE_OK) {
+        n_keys = reader->n_cells < KEYS_MAX ? reader->n_cells : KEYS_MAX;
+        memcpy(keys, reader->cells, sizeof *keys * (size_t)n_keys);
+        status = next_words(reader, "the header's values");
+    }
+    for (int32_t i = 0; i < n_keys && i < reader->n_cells && status == MHE_OK; i++) {
+        status = take_key(reader, keys[i], reader->cells[i], header);
+    }
+    if (status == MHE_OK && reader->table->unit_name[0] == '\0') {
+        status = mhi_table_fail(reader, "the header has no Units; mm, cm or m is needed");
+    }
+    return status;
+}
+
+/* Lines 4 and 5: names; and X1 Y1 Z1 ..., which may be absent. */
+static mhe_status read_labels(mhi_table_reader *reader, const trc_header *header) {
+    mhe_status status = next_words(reader, "the marker names (Frame# Time ...)");
+    if (status != MHE_OK) {
+        return status;
+    }
+    if (reader->n_cells < 2 ||
+        !(mhi_cell_is(reader->cells[0], "Frame#") || mhi_cell_is(reader->cells[0], "Frame")) ||
+        !(mhi_cell_is(reader->cells[1], "Time") || mhi_cell_is(reader->cells[1], "Times"))) {
+        return mhi_table_fail(reader, "line 4 must hold 'Frame#', 'Time' and the marker names");
+    }
+    if (header->n_markers >= 0 && header->n_markers != reader->n_cells - 2) {
+        mhi_table_warn(reader, "the header says %d markers, there are %d names", header->n_markers,
+                       reader->n_cells - 2);
+    }
+    status = mhi_table_labels(reader, 2, 3);
+    mhi_table_reader before = *reader;
+    if (status == MHE_OK && mhi_table_next(reader)) {
+        mhi_cell line = mhi_cell_trim(reader->line);
+        if (line.length > 0 && *line.text != 'X' && *line.text != 'x') {
+            *reader = before; /* already data */
+        }
+    }
+    return status;
+}
+
+/* A marker is known in all three coordinates or not at all. */
+static void complete_markers(mhi_table *table) {
+    double *row = table->values + (size_t)(table->n_rows - 1) * (size_t)table->n_columns;
+    for (int32_t i = 0; i < table->n_columns; i += 3) {
+        if (isnan(row[i] + row[i + 1] + row[i + 2])) {
+            row[i] = row[i + 1] = row[i + 2] = NAN;
+        }
+    }
+}
+
+static mhe_status read_rows(mhi_table_reader *reader, const trc_header *header) {
+    mhi_table *table = reader->table;
+    while (mhi_table_next(reader)) {
+        if (mhi_table_blank(reader) && table->n_rows == 0) {
+            continue;
+        }
+        if (mhi_table_blank(reader)) {
+            mhi_table_ended(reader);
+            break;
+        }
+        mhe_status status = mhi_table_row(reader, 1);
+        if (status != MHE_OK) {
+            return status;
+        }
+        complete_markers(table);
+    }
+    if (header->n_frames >= 0 && header->n_frames != table->n_rows) {
+        mhi_table_warn(reader, "the header says %d frames, there are %d", header->n_frames,
+                       table->n_rows);
+    }
+    reader->n_missing = 0; /* the usual way to say it in this format: nothing to warn of */
+    return MHE_OK;
+}
+
+mhe_status mhi_trc_parse(const char *name, const char *text, size_t length, mhi_table **table,
+                         mhe_error *err) {
+    mhi_table_reader reader;
+    trc_header header = {-1, -1};
+    mhe_status status = mhi_table_begin(&reader, name, text, length, err);
+    if (status == MHE_OK) {
+        status = read_header(&reader, &header);
+    }
+    if (status == MHE_OK) {
+        status = read_labels(&reader, &header);
+    }
+    if (status == MHE_OK) {
+        status = read_rows(&reader, &header);
+    }
+    return mhi_table_finish(&reader, status, table);
+}
+
+mhe_status mhi_trc_read(const char *path, mhi_table **table, mhe_error *err) {
+    return mhi_table_read(path, mhi_trc_parse, table, err);
+}
