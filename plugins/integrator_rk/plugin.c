@@ -1,0 +1,29 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* plugin.c: the descriptor and options of mhe.integrator.rk. */
+#include "rk.h"
+
+static const mhe_option rk_options[] = {
+    MHE_OPT_ENUM(struct rk_config, scheme, "gauss", "gauss|rk4",
+                 "Gauss-Legendre collocation (implicit), or the classical explicit scheme."),
+    MHE_OPT_INT(struct rk_config, stages, 3, 1, RK_MAX_STAGES, "1",
+                "Stages of the Gauss scheme; its order is twice that."),
+    MHE_OPT_REAL(struct rk_config, max_step, 0.03, 1e-6, 10, "s",
+                 "An interval is cut into equal steps no longer than this."),
+    MHE_OPT_REAL(struct rk_config, newton_tolerance, 1e-10, 1e-14, 1e-3, "1",
+                 "Error left in the stage velocities, relative to 1 + |qdot|."),
+    MHE_OPT_INT(struct rk_config, max_newton, 20, 1, 1000, "1",
+                "Newton iterations before a step is halved."),
+};
+
+static const mhe_plugin rk_plugin = {
+    .size = sizeof rk_plugin,
+    .id = "mhe.integrator.rk",
+    .version = "0.1.0",
+    .summary = "Fixed-step Gauss-Legendre or explicit Runge-Kutta steps with the exact derivatives "
+               "of the discrete map",
+    .reference = "Hairer, Wanner: Solving Ordinary Differential Equations II, chapter IV.8",
+    .iface = MHE_INTEGRATOR_IFACE,
+    .ops = &rk_ops,
+    MHE_PLUGIN_OPTIONS(struct rk_config, rk_options)};
+
+MHE_PLUGIN_LIBRARY(&rk_plugin)

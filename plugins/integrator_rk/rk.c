@@ -1,0 +1,233 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* rk.c: instances, contexts, and the step over a shooting interval. */
+#include "rk.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Steps of the activations are at most this many of their shortest time constants long: the 4-stage
+ * scheme is then off by less than 1e-6 of e - a. */
+#define RK_ACTIVATION_STEP 1.25
+/* An interval whose steps have no solution is tried again with steps of half the length, this
+ * often. */
+#define RK_HALVINGS 3
+
+/* Longest step of the activations from their rates at the corners of [0, 1]^2. */
+static mhe_status rk_activation_limit(struct rk *rk, mhe_error *err) {
+    const mhe_system *system = rk->system;
+    size_t n = (size_t)system->n_m;
+    double *memory = calloc(5 * n + 1, sizeof *memory), fastest = 1e-3;
+    if (memory == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
+    }
+    double *e = memory, *a = e + n, *rate = a + n, *rate_e = rate + n, *rate_a = rate_e + n;
+    mhe_status status = MHE_OK;
+    for (int corner = 0; corner < 4 && status == MHE_OK; corner++) {
+        for (size_t i = 0; i < n; i++) {
+            e[i] = corner & 1;
+            a[i] = corner >> 1;
+        }
+        status = system->activation_rate(system, e, a, rate, rate_e, rate_a, err);
+        for (size_t i = 0; i < n && status == MHE_OK; i++) {
+            fastest = fmax(fastest, fabs(rate_a[i]));
+        }
+    }
+    rk->activation_step = RK_ACTIVATION_STEP / fastest;
+    free(memory);
+    return status;
+}
+
+static void rk_destroy(void *self) {
+    free(self);
+}
+
+static mhe_status rk_create(const mhe_host *host, const mhe_system *system, const void *config,
+                            void **self, mhe_error *err) {
+    (void)host;
+    struct rk *rk = calloc(1, sizeof *rk);
+    if (rk == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
+    }
+    rk->system = system;
+    rk->config = *(const struct rk_config *)config;
+    rk_tableau_gauss(RK_MAX_STAGES, &rk->activation);
+    if (rk->config.scheme == RK_RK4) {
+        rk_tableau_rk4(&rk->mechanics);
+    } else {
+        rk_tableau_gauss(rk->config.stages, &rk->mechanics);
+    }
+    mhe_status status = system->n_a > 0 ? rk_activation_limit(rk, err) : MHE_OK;
+    if (status != MHE_OK) {
+        rk_destroy(rk);
+        return status;
+    }
+    *self = rk;
+    return MHE_OK;
+}
+
+static void rk_context_destroy(void *context) {
+    struct rk_context *c = context;
+    if (c != NULL) {
+        free(c->memory);
+        free(c->pivots);
+        free(c);
+    }
+}
+
+static mhe_status rk_context_create(const void *self, void *system_context, void **context,
+                                    mhe_error *err) {
+    const struct rk *rk = self;
+    const mhe_system *system = rk->system;
+    size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, n_r = (size_t)system->n_r;
+    size_t s = (size_t)rk->mechanics.stages, columns = 2 * n_q + (size_t)system->n_a + n_m + n_r;
+    struct rk_context *c = calloc(1, sizeof *c);
+    if (c == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
+    }
+    const struct {
+        double **array;
+        size_t n;
+    } arrays[] = {{&c->a, n_m},
+                  {&c->a_a, n_m},
+                  {&c->a_e, n_m},
+                  {&c->a_start, n_m},
+                  {&c->stage_a, s * n_m},
+                  {&c->stage_a_a, s * n_m},
+                  {&c->stage_a_e, s * n_m},
+                  {&c->slope, RK_MAX_STAGES * n_m},
+                  {&c->slope_a, RK_MAX_STAGES * n_m},
+                  {&c->slope_e, RK_MAX_STAGES * n_m},
+                  {&c->guess, RK_MAX_STAGES * n_m},
+                  {&c->q, n_q},
+                  {&c->v, n_q},
+                  {&c->K, s * n_q},
+                  {&c->stage_q, n_q},
+                  {&c->stage_v, n_q},
+                  {&c->f, s * n_q},
+                  {&c->f_q, s * n_q * n_q},
+                  {&c->f_v, s * n_q * n_q},
+                  {&c->f_a, s * n_q * n_m},
+                  {&c->f_r, s * n_q * n_r},
+                  {&c->jacobian, s * n_q * s * n_q},
+                  {&c->residual, s * n_q},
+                  {&c->adjoint, 2 * n_q * s * n_q},
+                  {&c->carry, 2 * n_q * 2 * n_q},
+                  {&c->sens, 2 * n_q * columns},
+                  {&c->sens_next, 2 * n_q * columns}};
+    const size_t n_arrays = sizeof arrays / sizeof arrays[0];
+    size_t total = 1;
+    for (size_t i = 0; i < n_arrays; i++) {
+        total += arrays[i].n;
+    }
+    c->rk = rk;
+    c->system_context = system_context;
+    c->columns = (int32_t)columns;
+    c->memory = calloc(total, sizeof *c->memory);
+    c->pivots = calloc(s * n_q + 1, sizeof *c->pivots);
+    if (c->memory == NULL || c->pivots == NULL) {
+        rk_context_destroy(c);
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
+    }
+    double *next = c->memory;
+    for (size_t i = 0; i < n_arrays; i++) {
+        *arrays[i].array = next;
+        next += arrays[i].n;
+    }
+    *context = c;
+    return MHE_OK;
+}
+
+static void rk_fill(double *x, int32_t n, double value) {
+    for (int32_t i = 0; i < n; i++) {
+        x[i] = value;
+    }
+}
+
+/* Puts the context at the start of an interval. Without activations among the states the controls
+ * are the stage activations. */
+static void rk_begin(struct rk_context *c, const double *x, const double *u) {
+    const mhe_system *system = c->rk->system;
+    int32_t n_q = system->n_q, n_m = system->n_m, s = c->rk->mechanics.stages;
+    size_t bytes_q = sizeof(double) * (size_t)n_q, bytes_m = sizeof(double) * (size_t)n_m;
+    memcpy(c->q, x, bytes_q);
+    memcpy(c->v, x + n_q, bytes_q);
+    memcpy(c->a, system->n_a > 0 ? x + 2 * n_q : u, bytes_m);
+    rk_fill(c->a_a, n_m, 1);
+    rk_fill(c->a_e, n_m, 0);
+    if (system->n_a == 0) {
+        memcpy(c->a_start, u, bytes_m);
+        for (int32_t j = 0; j < s; j++) {
+            memcpy(c->stage_a + j * n_m, u, bytes_m);
+        }
+        rk_fill(c->stage_a_e, s * n_m, 1);
+    }
+    memset(c->sens, 0, sizeof(double) * (size_t)(2 * n_q * c->columns));
+    for (int32_t i = 0; i < 2 * n_q; i++) {
+        c->sens[i * c->columns + i] = 1;
+    }
+}
+
+/* Splits the carried derivatives into A and B. */
+static void rk_derivatives(const struct rk_context *c, double *A, double *B) {
+    const mhe_system *system = c->rk->system;
+    int32_t n_q = system->n_q, n_a = system->n_a, n_x = system->n_x, n_u = system->n_u;
+    for (int32_t i = 0; i < 2 * n_q; i++) {
+        const double *row = c->sens + i * c->columns;
+        memcpy(A + i * n_x, row, sizeof(double) * (size_t)n_x);
+        memcpy(B + i * n_u, row + n_x, sizeof(double) * (size_t)n_u);
+    }
+    memset(A + 2 * n_q * n_x, 0, sizeof(double) * (size_t)(n_a * n_x));
+    memset(B + 2 * n_q * n_u, 0, sizeof(double) * (size_t)(n_a * n_u));
+    for (int32_t i = 0; i < n_a; i++) {
+        A[(2 * n_q + i) * n_x + 2 * n_q + i] = c->a_a[i];
+        B[(2 * n_q + i) * n_u + i] = c->a_e[i];
+    }
+}
+
+/* The interval in n steps of length h. */
+static mhe_status rk_steps(struct rk_context *c, const double *u, int32_t n, double h,
+                           int32_t derivatives, mhe_error *err) {
+    const mhe_system *system = c->rk->system;
+    const double *r = system->n_r > 0 ? u + system->n_m : NULL;
+    mhe_status status = MHE_OK;
+    for (int32_t k = 0; k < n && status == MHE_OK; k++) {
+        if (system->n_a > 0) {
+            status = rk_activations(c, u, h, derivatives, err);
+        }
+        if (status == MHE_OK) {
+            status = rk_mechanics(c, r, h, derivatives, err);
+        }
+    }
+    return status;
+}
+
+static mhe_status rk_step(void *context, const double *x, const double *u, double dt,
+                          double *x_next, double *A, double *B, mhe_error *err) {
+    struct rk_context *c = context;
+    const mhe_system *system = c->rk->system;
+    int32_t n_q = system->n_q;
+    int32_t n = (int32_t)fmax(1, ceil(dt / c->rk->config.max_step - 1e-9));
+    mhe_status status = MHE_RETRY;
+    for (int32_t halving = 0; halving <= RK_HALVINGS && status == MHE_RETRY; halving++, n *= 2) {
+        rk_begin(c, x, u);
+        status = rk_steps(c, u, n, dt / n, A != NULL, err);
+    }
+    if (status != MHE_OK) {
+        return status;
+    }
+    memcpy(x_next, c->q, sizeof(double) * (size_t)n_q);
+    memcpy(x_next + n_q, c->v, sizeof(double) * (size_t)n_q);
+    memcpy(x_next + 2 * n_q, c->a, sizeof(double) * (size_t)system->n_a);
+    if (A != NULL) {
+        rk_derivatives(c, A, B);
+    }
+    return MHE_OK;
+}
+
+const mhe_integrator_ops rk_ops = {.size = sizeof rk_ops,
+                                   .create = rk_create,
+                                   .destroy = rk_destroy,
+                                   .context_create = rk_context_create,
+                                   .context_destroy = rk_context_destroy,
+                                   .step = rk_step};
