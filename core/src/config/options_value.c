@@ -194,17 +194,15 @@ static mhe_status read_enum(const mhi_filler *f, const mhe_option *option, const
                              mhi_suggest(hint, sizeof hint, text, names, n));
 }
 
-/* `text` with respect to the config's folder. */
-static const char *absolute(const mhi_filler *f, const char *text) {
-    if (text[0] == '/' || f->dir == NULL) {
-        return mhi_arena_text(f->arena, text);
+const char *mhi_path_absolute(const char *dir, const char *path, mhi_arena *arena) {
+    if (path[0] == '/' || dir == NULL) {
+        return mhi_arena_text(arena, path);
     }
-    while (strncmp(text, "./", 2) == 0 && text[2] != '\0') {
-        text += 2;
+    while (strncmp(path, "./", 2) == 0 && path[2] != '\0') {
+        path += 2;
     }
-    size_t n = strlen(f->dir);
-    return mhi_arena_format(f->arena, "%s%s%s", f->dir, n > 0 && f->dir[n - 1] == '/' ? "" : "/",
-                            text);
+    size_t n = strlen(dir);
+    return mhi_arena_format(arena, "%s%s%s", dir, n > 0 && dir[n - 1] == '/' ? "" : "/", path);
 }
 
 static mhe_status read_path(const mhi_filler *f, const mhe_option *option, const mhi_node *node,
@@ -212,7 +210,7 @@ static mhe_status read_path(const mhi_filler *f, const mhe_option *option, const
     if (node->kind != MHI_SCALAR || node->text[0] == '\0') {
         return wrong_type(f, option, node);
     }
-    *out = absolute(f, node->text);
+    *out = mhi_path_absolute(f->dir, node->text, f->arena);
     return *out == NULL ? mhi_filler_no_memory(f) : MHE_OK;
 }
 
@@ -331,8 +329,9 @@ mhe_status mhi_filler_default(const mhi_filler *f, const mhe_option *option) {
         *(const char **)field = option->text_default == NULL ? "" : option->text_default;
         break;
     case MHE_TYPE_PATH:
-        *(const char **)field =
-            option->text_default == NULL ? NULL : absolute(f, option->text_default);
+        *(const char **)field = option->text_default == NULL
+                                    ? NULL
+                                    : mhi_path_absolute(f->dir, option->text_default, f->arena);
         return option->text_default != NULL && *(const char **)field == NULL
                    ? mhi_filler_no_memory(f)
                    : MHE_OK;

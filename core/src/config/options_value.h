@@ -30,4 +30,7 @@ mhe_status mhi_filler_refuse(const mhi_filler *filler, const mhi_node *node, con
                              ...);
 mhe_status mhi_filler_no_memory(const mhi_filler *filler);
 
+/* `path` with respect to the folder `dir` (NULL: as it is); NULL when memory is out. */
+const char *mhi_path_absolute(const char *dir, const char *path, mhi_arena *arena);
+
 #endif

@@ -22,8 +22,8 @@ typedef struct mhi_use {
 #define MHI_UNSUPPORTED_STOP 0
 #define MHI_UNSUPPORTED_WARN 1
 
-/* Sections of the file, each filled from an option table of its own (run.c). Paths are absolute or
- * NULL. */
+/* Sections of the file, each filled from an option table of its own (run_sections.c). Paths are
+ * absolute or NULL. */
 typedef struct mhi_model_section {
     const char *file;
     int32_t unsupported; /* MHI_UNSUPPORTED_* */
@@ -63,7 +63,8 @@ typedef struct mhi_run {
     mhi_use model, muscle, integrator, solver;
     mhi_use *costs;
     int32_t n_costs;
-    int32_t formulation; /* MHE_FORMULATION_* */
+    int32_t formulation;       /* MHE_FORMULATION_* */
+    mhe_text_list plugin_path; /* absolute folders */
     mhi_model_section model_file;
     mhi_data_section data;
     mhi_initial_section initial;
@@ -73,6 +74,22 @@ typedef struct mhi_run {
     mhi_tree *tree;
     mhi_arena arena; /* all of the above */
 } mhi_run;
+
+/* A section of the file, for reading and for documentation. */
+typedef struct mhi_section {
+    const char *name;  /* "" is the top level of the file */
+    const char *help;  /* one sentence */
+    const char *iface; /* of the plugin that the section names (its options are keys too); NULL */
+    const mhe_option *options;
+    int32_t n_options;
+    uint32_t offset; /* in mhi_run: the section's struct or, with iface, its mhi_use; 0 for "" and
+                      * costs */
+} mhi_section;
+
+/* All sections in the order in which they are written. "costs" is a list of such sections. [any] */
+const mhi_section *mhi_run_sections(int32_t *n);
+/* Option table of a section; NULL if there is none of that name. [any] */
+const mhe_option *mhi_run_section(const char *section, int32_t *n);
 
 /* Reads and checks a config with `set` [n_set] assignments applied. Finds every plugin it names in
  * `registry` (the file's plugin_path is searched first, if given). MHE_E_CONFIG, MHE_E_INPUT,

@@ -1,0 +1,325 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* run.c: from a configuration file to a checked description of the run. */
+#include "config/run.h"
+
+#include "config/options.h"
+#include "config/options_value.h"
+#include "config/run_sections.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct reader {
+    mhi_run *run;
+    mhi_registry *registry;
+    mhe_error *err;
+};
+
+static mhe_status no_memory(const struct reader *r) {
+    return mhe_fail(r->err, MHE_E_MEMORY, "out of memory");
+}
+
+static mhi_node *section_node(const mhi_run *run, const char *name) {
+    return mhi_node_find(mhi_tree_root(run->tree), name);
+}
+
+/* ---- the file, its name and the assignments from the command line ---- */
+
+/* "solver: ID" is short for "solver: {plugin: ID}". */
+static mhe_status expand_short_forms(const struct reader *r) {
+    int32_t n = 0;
+    const mhi_section *sections = mhi_run_sections(&n);
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < n && status == MHE_OK; i++) {
+        mhi_node *node = section_node(r->run, sections[i].name);
+        if (node == NULL || sections[i].iface == NULL) {
+            continue;
+        }
+        if (strcmp(sections[i].iface, MHE_COST_IFACE) != 0) {
+            status = mhi_node_expand(r->run->tree, node, "plugin", r->err);
+            continue;
+        }
+        for (mhi_node *cost = node->kind == MHI_SEQUENCE ? node->first : NULL;
+             cost != NULL && status == MHE_OK; cost = cost->next) {
+            status = mhi_node_expand(r->run->tree, cost, "plugin", r->err);
+        }
+    }
+    return status;
+}
+
+/* The folder is made absolute, so that a resolved configuration holds wherever it is read. */
+static mhe_status name_run(const struct reader *r, const char *path) {
+    mhi_run *run = r->run;
+    const char *slash = strrchr(path, '/');
+    const char *base = slash == NULL ? path : slash + 1;
+    const char *dot = strrchr(base, '.');
+    size_t n_folder = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
+    run->path = mhi_arena_text(&run->arena, path);
+    run->name = mhi_arena_text_n(&run->arena, base,
+                                 dot == NULL || dot == base ? strlen(base) : (size_t)(dot - base));
+    if (path[0] == '/') {
+        run->dir = mhi_arena_text_n(&run->arena, path, n_folder);
+    } else {
+        char here[4096];
+        if (getcwd(here, sizeof here) == NULL) {
+            return mhe_fail(r->err, MHE_E_INPUT, "the working directory is not known: %s",
+                            strerror(errno));
+        }
+        run->dir = n_folder == 0
+                       ? mhi_arena_text(&run->arena, here)
+                       : mhi_arena_format(&run->arena, "%s/%.*s", here, (int)n_folder, path);
+    }
+    return run->path == NULL || run->name == NULL || run->dir == NULL ? no_memory(r) : MHE_OK;
+}
+
+static mhe_status read_tree(const struct reader *r, const char *path, const char *const *set,
+                            int32_t n_set) {
+    mhe_status status = mhi_tree_read(path, &r->run->tree, r->err);
+    if (status == MHE_OK) {
+        status = name_run(r, path);
+    }
+    if (status == MHE_OK && mhi_tree_root(r->run->tree)->kind != MHI_MAPPING) {
+        status = mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, mhi_tree_root(r->run->tree),
+                             "a configuration is a mapping of sections (model, costs, ...)");
+    }
+    if (status == MHE_OK) {
+        status = expand_short_forms(r);
+    }
+    for (int32_t i = 0; i < n_set && status == MHE_OK; i++) {
+        status = mhi_tree_set(r->run->tree, set[i], r->err);
+        if (status == MHE_OK) {
+            status = expand_short_forms(r);
+        }
+    }
+    return status;
+}
+
+/* ---- sections without a plugin ---- */
+
+static mhe_status read_top(const struct reader *r) {
+    mhi_run *run = r->run;
+    int32_t n = 0, n_top = 0;
+    const mhi_section *sections = mhi_run_sections(&n);
+    const mhe_option *options = mhi_run_section("", &n_top);
+    const char **names = MHI_TAKE(&run->arena, const char *, n);
+    if (names == NULL) {
+        return no_memory(r);
+    }
+    for (int32_t i = 1; i < n; i++) { /* 0 is the top level itself */
+        names[i - 1] = sections[i].name;
+    }
+    mhi_top_section top = {0};
+    mhe_status status = mhi_options_fill(options, n_top, run->tree, mhi_tree_root(run->tree), names,
+                                         n - 1, NULL, run->dir, &run->arena, &top, r->err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    run->formulation = top.formulation;
+    const char **folders = MHI_TAKE(&run->arena, const char *, top.plugin_path.n);
+    if (folders == NULL) {
+        return no_memory(r);
+    }
+    run->plugin_path = (mhe_text_list){.values = folders, .n = top.plugin_path.n};
+    for (int32_t i = 0; i < top.plugin_path.n && status == MHE_OK; i++) {
+        folders[i] = mhi_path_absolute(run->dir, top.plugin_path.values[i], &run->arena);
+        status = folders[i] == NULL ? no_memory(r)
+                                    : mhi_registry_add_folder(r->registry, folders[i], r->err);
+    }
+    return status;
+}
+
+static mhe_status read_plain_sections(const struct reader *r) {
+    mhi_run *run = r->run;
+    int32_t n = 0;
+    const mhi_section *s = mhi_run_sections(&n);
+    mhe_status status = MHE_OK;
+    for (const mhi_section *end = s + n; s < end && status == MHE_OK; s++) {
+        if (s->iface == NULL && s->offset != 0) {
+            status = mhi_options_fill(s->options, s->n_options, run->tree,
+                                      section_node(run, s->name), NULL, 0, s->name, run->dir,
+                                      &run->arena, (unsigned char *)run + s->offset, r->err);
+        }
+    }
+    return status;
+}
+
+/* ---- sections with a plugin ---- */
+
+static mhe_status find_plugin(const struct reader *r, const mhi_section *section,
+                              const mhi_node *node, mhi_use *use) {
+    const mhi_node *entry = mhi_node_find(node, "plugin");
+    const char *id = section->options[0].text_default; /* every such table starts with `plugin` */
+    if (entry != NULL && entry->kind == MHI_SCALAR && !mhi_node_is_null(entry)) {
+        id = entry->text;
+    } else if (entry != NULL || id == NULL) {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, entry != NULL ? entry : node,
+                           "%s: the id of a plugin is missing: {plugin: ID, ...}", section->name);
+    }
+    mhe_error why = {0};
+    mhe_status status = mhi_registry_find(r->registry, id, section->iface, &use->plugin, &why);
+    return status == MHE_OK
+               ? MHE_OK
+               : mhi_fail_at(r->err, status, r->run->tree, entry != NULL ? entry : node, "%s: %s",
+                             section->name, why.text);
+}
+
+static const char **keys_of(const struct reader *r, const mhe_option *options, int32_t n) {
+    const char **keys = MHI_TAKE(&r->run->arena, const char *, n);
+    for (int32_t i = 0; i < n && keys != NULL; i++) {
+        keys[i] = options[i].key;
+    }
+    return keys;
+}
+
+/* The plugin's keys and the core's share one mapping. */
+static mhe_status check_shared_keys(const struct reader *r, const mhi_section *section,
+                                    const mhi_node *node, const mhe_plugin *plugin) {
+    for (uint32_t i = 0; i < plugin->option_count; i++) {
+        for (int32_t k = 0; k < section->n_options; k++) {
+            if (strcmp(plugin->options[i].key, section->options[k].key) == 0) {
+                return mhi_fail_at(r->err, MHE_E_PLUGIN, r->run->tree, node,
+                                   "%s: the plugin's option '%s' has the name of a key of every "
+                                   "'%s' section",
+                                   plugin->id, plugin->options[i].key, section->name);
+            }
+        }
+    }
+    return MHE_OK;
+}
+
+static mhe_status read_use(const struct reader *r, const mhi_section *section, const mhi_node *node,
+                           mhi_use *use, mhi_use_section *own) {
+    mhi_run *run = r->run;
+    if (node != NULL && node->kind != MHI_MAPPING) {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, node,
+                           "%s: must be the id of a plugin or a mapping {plugin: ID, ...}",
+                           section->name);
+    }
+    mhe_status status = find_plugin(r, section, node, use);
+    if (status != MHE_OK) {
+        return status;
+    }
+    const mhe_plugin *plugin = use->plugin;
+    int32_t n = (int32_t)plugin->option_count;
+    const char **core_keys = keys_of(r, section->options, section->n_options);
+    const char **plugin_keys = keys_of(r, plugin->options, n);
+    void *config = mhi_arena_take(&run->arena, plugin->config_size);
+    if (core_keys == NULL || plugin_keys == NULL || config == NULL) {
+        return no_memory(r);
+    }
+    use->node = node;
+    use->config = config;
+    status = check_shared_keys(r, section, node, plugin);
+    if (status == MHE_OK) {
+        status =
+            mhi_options_fill(plugin->options, n, run->tree, node, core_keys, section->n_options,
+                             plugin->id, run->dir, &run->arena, config, r->err);
+    }
+    if (status == MHE_OK) {
+        status =
+            mhi_options_fill(section->options, section->n_options, run->tree, node, plugin_keys, n,
+                             section->name, run->dir, &run->arena, own, r->err);
+    }
+    use->weight = own->weight;
+    use->sigma = own->sigma;
+    return status;
+}
+
+static mhe_status read_costs(const struct reader *r, const mhi_section *section) {
+    mhi_run *run = r->run;
+    const mhi_node *list = section_node(run, section->name);
+    if (list == NULL || list->kind != MHI_SEQUENCE || list->first == NULL) {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, list,
+                           "costs: a list with at least one entry is needed, like "
+                           "[{plugin: mhe.cost.emg-markers-high}]");
+    }
+    run->n_costs = mhi_node_count(list);
+    run->costs = MHI_TAKE(&run->arena, mhi_use, run->n_costs);
+    if (run->costs == NULL) {
+        return no_memory(r);
+    }
+    mhe_status status = MHE_OK;
+    mhi_use *use = run->costs;
+    for (const mhi_node *node = list->first; node != NULL && status == MHE_OK; node = node->next) {
+        mhi_use_section own = {0};
+        status = read_use(r, section, node, use++, &own);
+    }
+    return status;
+}
+
+static mhe_status read_plugin_sections(const struct reader *r) {
+    mhi_run *run = r->run;
+    int32_t n = 0;
+    const mhi_section *s = mhi_run_sections(&n);
+    mhe_status status = MHE_OK;
+    for (const mhi_section *end = s + n; s < end && status == MHE_OK; s++) {
+        mhi_use_section own = {0};
+        if (s->iface == NULL) {
+            continue;
+        }
+        if (strcmp(s->iface, MHE_COST_IFACE) == 0) {
+            status = read_costs(r, s);
+            continue;
+        }
+        mhi_use *use = (mhi_use *)(void *)((unsigned char *)run + s->offset);
+        status = read_use(r, s, section_node(run, s->name), use, &own);
+        if (use == &run->model) {
+            run->model_file = (mhi_model_section){.file = own.file, .unsupported = own.unsupported};
+        }
+    }
+    return status;
+}
+
+/* ---- what no single key can tell ---- */
+
+static mhe_status check_run(const struct reader *r) {
+    mhi_run *run = r->run;
+    const mhi_bounds_section *b = &run->bounds;
+    if (run->initial.q.n > 0 && run->initial.qdot.n > 0 &&
+        run->initial.q.n != run->initial.qdot.n) {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, section_node(run, "initial"),
+                           "initial: 'q' has %d values and 'qdot' %d", (int)run->initial.q.n,
+                           (int)run->initial.qdot.n);
+    }
+    int activation = b->activation_min > b->activation_max;
+    if (activation || b->excitation_min > b->excitation_max) {
+        const char *name = activation ? "activation" : "excitation";
+        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, section_node(run, "bounds"),
+                           "bounds: '%s_min' is above '%s_max'", name, name);
+    }
+    if (run->data.emg_delay < 0) {
+        run->data.emg_delay = run->formulation == MHE_FORMULATION_ACTIVATION ? 2 : 0;
+    }
+    return MHE_OK;
+}
+
+mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
+                        mhi_registry *registry, mhi_run **out, mhe_error *err) {
+    *out = NULL;
+    mhi_run *run = calloc(1, sizeof *run);
+    const struct reader reader = {run, registry, err};
+    if (run == NULL) {
+        return no_memory(&reader);
+    }
+    mhe_status status = read_tree(&reader, path, set, n_set);
+    status = status == MHE_OK ? read_top(&reader) : status;
+    status = status == MHE_OK ? read_plain_sections(&reader) : status;
+    status = status == MHE_OK ? read_plugin_sections(&reader) : status;
+    status = status == MHE_OK ? check_run(&reader) : status;
+    if (status != MHE_OK) {
+        mhi_run_free(run);
+        return status;
+    }
+    *out = run;
+    return MHE_OK;
+}
+
+void mhi_run_free(mhi_run *run) {
+    if (run != NULL) {
+        mhi_tree_free(run->tree);
+        mhi_arena_free(&run->arena);
+        free(run);
+    }
+}

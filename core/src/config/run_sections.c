@@ -1,0 +1,128 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* run_sections.c: every key that the core itself understands, with default and range. */
+#include "config/run_sections.h"
+
+#include <float.h>
+#include <math.h>
+#include <mhe/integrator.h>
+#include <mhe/model.h>
+#include <mhe/muscle.h>
+#include <mhe/solver.h>
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+static const mhe_option top_options[] = {
+    MHE_OPT_ENUM(mhi_top_section, formulation, "excitation", "excitation|activation",
+                 "What the muscles are driven by: excitations (activations are states) or "
+                 "activations directly."),
+    MHE_OPT_TEXTS(mhi_top_section, plugin_path, 0,
+                  "Folders searched for plugins before the standard ones."),
+};
+
+static const mhe_option model_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.model.simbody", "Plugin of the skeleton."),
+    MHE_OPT_PATH(mhi_use_section, file, MHE_OPT_REQUIRED, "Model file, .osim or .bioMod."),
+    MHE_OPT_ENUM(mhi_use_section, unsupported, "stop", "stop|warn",
+                 "What to do when the model file holds something that cannot be represented."),
+};
+
+static const mhe_option muscle_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.muscle.hill", "Plugin of the muscles."),
+};
+
+static const mhe_option data_options[] = {
+    MHE_OPT_PATH(mhi_data_section, markers, 0, "Measured markers, .trc."),
+    MHE_OPT_PATH(mhi_data_section, emg, 0, "Processed EMG or excitations, 0 to 1, .sto or .mot."),
+    MHE_OPT_PATH(mhi_data_section, reference, 0,
+                 "Known motion to start from and to compare with, .sto."),
+    MHE_OPT_INT(mhi_data_section, emg_delay, -1, -1, 1000, "samples",
+                "Samples by which the tracked EMG lags behind; -1: 0 when excitation-driven, 2 "
+                "when activation-driven."),
+};
+
+static const mhe_option initial_options[] = {
+    MHE_OPT_REALS(mhi_initial_section, q, 0, -DBL_MAX, DBL_MAX, "rad or m",
+                  "Coordinates at the start; none: from the reference, else found from the "
+                  "markers."),
+    MHE_OPT_REALS(mhi_initial_section, qdot, 0, -DBL_MAX, DBL_MAX, "rad/s or m/s",
+                  "Velocities at the start; none: from the reference, else free."),
+    MHE_OPT_REAL(mhi_initial_section, tolerance, 0.1, 0, 100, "rad, rad/s",
+                 "Half width of the bounds around a known start."),
+};
+
+static const mhe_option horizon_options[] = {
+    MHE_OPT_INT(mhi_horizon_section, window, 7, 1, 1000, "1", "Intervals in the window."),
+    MHE_OPT_INT(mhi_horizon_section, ratio, 1, 1, INT32_MAX, "1",
+                "Every ratio-th frame of the data is used."),
+};
+
+static const mhe_option bounds_options[] = {
+    MHE_OPT_BOOL(mhi_bounds_section, residual_torques, 0, "Add a free torque at every coordinate."),
+    MHE_OPT_REAL(mhi_bounds_section, residual_torque_max, 100, 0, INFINITY, "N m",
+                 "Largest magnitude of a residual torque."),
+    MHE_OPT_REAL(mhi_bounds_section, velocity_max, 10 * PI, 1e-6, INFINITY, "rad/s",
+                 "Largest magnitude of a coordinate's velocity."),
+    MHE_OPT_REAL(mhi_bounds_section, activation_min, 0, 0, 1, "1", "Least activation."),
+    MHE_OPT_REAL(mhi_bounds_section, activation_max, 1, 0, 1, "1", "Largest activation."),
+    MHE_OPT_REAL(mhi_bounds_section, excitation_min, 0, 0, 1, "1", "Least excitation."),
+    MHE_OPT_REAL(mhi_bounds_section, excitation_max, 1, 0, 1, "1", "Largest excitation."),
+};
+
+static const mhe_option integrator_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.integrator.rk", "Plugin of the integrator."),
+};
+
+static const mhe_option cost_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, MHE_OPT_REQUIRED, NULL, "Plugin of this cost."),
+    MHE_OPT_REAL(mhi_use_section, weight, 1, 0, DBL_MAX, "1", "Factor of the whole cost."),
+    MHE_OPT_REAL(mhi_use_section, sigma, 1, 1e-12, DBL_MAX, "unit of the residual",
+                 "Residual that counts as one; the cost is divided by its square."),
+};
+
+static const mhe_option solver_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.solver.ipopt", "Plugin of the solver."),
+};
+
+static const mhe_option output_options[] = {
+    MHE_OPT_BOOL(mhi_output_section, picture, 1,
+                 "Draw estimated against reference, where gnuplot is installed."),
+};
+
+#define SECTION(name, help, iface, table, offset) \
+    { name, help, iface, table, (int32_t)(sizeof(table) / sizeof((table)[0])), offset }
+#define AT(field) ((uint32_t)offsetof(mhi_run, field))
+
+static const mhi_section sections[] = {
+    SECTION("", "Top level of the file.", NULL, top_options, 0),
+    SECTION("model", "Skeleton, muscle paths and markers.", MHE_MODEL_IFACE, model_options,
+            AT(model)),
+    SECTION("muscle", "Forces and activation dynamics of the muscles.", MHE_MUSCLE_IFACE,
+            muscle_options, AT(muscle)),
+    SECTION("data", "Measured motion.", NULL, data_options, AT(data)),
+    SECTION("initial", "Start of the motion.", NULL, initial_options, AT(initial)),
+    SECTION("horizon", "The moving window.", NULL, horizon_options, AT(horizon)),
+    SECTION("bounds", "Bounds of states and controls.", NULL, bounds_options, AT(bounds)),
+    SECTION("integrator", "How the state is carried over an interval.", MHE_INTEGRATOR_IFACE,
+            integrator_options, AT(integrator)),
+    SECTION("costs", "A list: what the estimate is to be close to.", MHE_COST_IFACE, cost_options,
+            0),
+    SECTION("solver", "How a window is solved.", MHE_SOLVER_IFACE, solver_options, AT(solver)),
+    SECTION("output", "What is made of the results.", NULL, output_options, AT(output)),
+};
+
+const mhi_section *mhi_run_sections(int32_t *n) {
+    *n = (int32_t)(sizeof sections / sizeof sections[0]);
+    return sections;
+}
+
+const mhe_option *mhi_run_section(const char *section, int32_t *n) {
+    for (size_t i = 0; i < sizeof sections / sizeof sections[0]; i++) {
+        if (strcmp(sections[i].name, section) == 0) {
+            *n = sections[i].n_options;
+            return sections[i].options;
+        }
+    }
+    *n = 0;
+    return NULL;
+}

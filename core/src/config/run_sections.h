@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* run_sections.h: structs behind the sections that are not handed to the estimator as they are. */
+#ifndef MHI_RUN_SECTIONS_H
+#define MHI_RUN_SECTIONS_H
+
+#include "config/run.h"
+
+/* The top level of the file. */
+typedef struct mhi_top_section {
+    int32_t formulation;
+    mhe_text_list plugin_path;
+} mhi_top_section;
+
+/* The core's own keys of all sections that name a plugin; each section's table has some of them. */
+typedef struct mhi_use_section {
+    const char *plugin;
+    const char *file;     /* model */
+    int32_t unsupported;  /* model */
+    double weight, sigma; /* costs */
+} mhi_use_section;
+
+#endif
