@@ -1,63 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mhe-run: estimates joint angles, activations and muscle forces; asks plugins what they are. */
 #include "arguments.h"
-#include "base/text.h"
+#include "console.h"
 #include "track.h"
 
 #include <mhe/version.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-static void log_line(const mhe_host *host, int32_t level, const char *text) {
-    (void)host;
-    static const char *const names[] = {"error", "warning", "note", "debug"};
-    if (level <= MHE_LOG_WARNING) {
-        (void)fprintf(stderr, "mhe-run: %s: %s\n", names[level], text);
-    }
-}
-
-static const void *service(const mhe_host *host, const char *id) {
-    (void)host, (void)id;
-    return NULL;
-}
-
-static int exit_status(mhe_status status) {
-    switch (status) {
-    case MHE_OK:
-        return 0;
-    case MHE_E_ARGUMENT:
-    case MHE_E_CONFIG:
-    case MHE_E_INPUT:
-    case MHE_E_PLUGIN:
-    case MHE_E_UNSUPPORTED:
-        return 2;
-    default:
-        return 1;
-    }
-}
-
-/* Prints a text that a library function made. */
-static mhe_status print(mhi_text *text, mhe_error *err) {
-    mhe_status status = MHE_OK;
-    if (text->failed || (text->data != NULL && fputs(text->data, stdout) == EOF)) {
-        status = mhe_fail(err, MHE_E_IO, "the output could not be written");
-    }
-    mhi_text_free(text);
-    return status;
-}
-
 static mhe_status show_plugins(const arguments *a, mhi_registry *registry, mhe_error *err) {
     mhi_text text = {0};
     if (a->mode == MODE_LIST) {
         mhi_registry_list(registry, a->format, &text);
-        return print(&text, err);
+        return console_print(&text, err);
     }
     mhe_status status = mhi_registry_describe(registry, a->id, a->format, &text, err);
     if (status != MHE_OK) {
         mhi_text_free(&text);
         return status;
     }
-    return print(&text, err);
+    return console_print(&text, err);
 }
 
 static mhe_status run_config(const arguments *a, const mhe_host *host, mhi_registry *registry,
@@ -84,7 +46,7 @@ static mhe_status run_config(const arguments *a, const mhe_host *host, mhi_regis
 }
 
 int main(int argc, char **argv) {
-    const mhe_host host = {.size = sizeof host, .log = log_line, .service = service};
+    const mhe_host host = console_host("mhe-run");
     arguments a;
     mhe_error err = {0};
     mhi_registry *registry = NULL;
@@ -106,5 +68,5 @@ int main(int argc, char **argv) {
     }
     mhi_registry_free(registry);
     free(a.set);
-    return exit_status(status);
+    return console_exit_status(status);
 }
