@@ -84,7 +84,7 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
         (void)mhe_fail(err, status, "no memory for a context");
         goto fail;
     }
-    status = skeleton_create(c->tree, &c->skeleton, err);
+    status = skeleton_create(c->tree, c->dynamics == SIMBODY_DYNAMICS_SIMBODY, &c->skeleton, err);
     if (status != MHE_OK) {
         goto fail;
     }

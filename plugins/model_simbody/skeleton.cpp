@@ -1,5 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* skeleton.cpp: the one file that knows Simbody. */
+/* Simbody's classes have other members under NDEBUG. Debian's libraries are built without it, so
+ * this file is too, in every build type. */
+#undef NDEBUG
+
 #include "skeleton.h"
 
 #include <Simbody.h>
@@ -48,8 +52,8 @@ Vec3 vector(const double *p) {
     return Vec3(p[0], p[1], p[2]);
 }
 
-MassProperties mass_properties(const tree_joint &link) {
-    if (link.mass <= 0) {
+MassProperties mass_properties(const tree_joint &link, bool with_mass) {
+    if (!with_mass || link.mass <= 0) {
         return MassProperties(0, Vec3(0), Inertia(0));
     }
     const double *i = link.inertia;
@@ -58,13 +62,13 @@ MassProperties mass_properties(const tree_joint &link) {
     return MassProperties(link.mass, com, central.shiftFromMassCenter(-com, link.mass));
 }
 
-void add_link(skeleton &s, const tree_joint &joint) {
+void add_link(skeleton &s, const tree_joint &joint, bool with_mass) {
     MobilizedBody &parent =
         joint.parent < 0 ? s.matter.updGround() : s.links[static_cast<size_t>(joint.parent)];
     /* the file's matrix as it is: Simbody would project a rounded one, and points of the same body
      * would then be placed by another matrix */
     Transform at(Rotation(matrix(joint.r), true), vector(joint.p));
-    Body::Rigid body(mass_properties(joint));
+    Body::Rigid body(mass_properties(joint, with_mass));
     if (joint.kind == MHE_MOTION_ROTATION) {
         s.links.push_back(MobilizedBody::Pin(parent, at, body, Transform()));
     } else {
@@ -72,9 +76,9 @@ void add_link(skeleton &s, const tree_joint &joint) {
     }
 }
 
-void build(skeleton &s) {
+void build(skeleton &s, bool with_mass) {
     for (int32_t i = 0; i < s.source->n_joints; i++) {
-        add_link(s, s.source->joints[i]);
+        add_link(s, s.source->joints[i], with_mass);
     }
     s.state = s.system.realizeTopology();
     s.system.realizeModel(s.state);
@@ -140,12 +144,12 @@ void mass_matrix(skeleton &s, double *mass) {
 
 } // namespace
 
-mhe_status skeleton_create(const tree *source, skeleton **out, mhe_error *err) {
+mhe_status skeleton_create(const tree *source, int32_t with_mass, skeleton **out, mhe_error *err) {
     *out = nullptr;
     skeleton *made = nullptr;
     mhe_status status = guarded(err, [&] {
         made = new skeleton(source);
-        build(*made);
+        build(*made, with_mass != 0);
     });
     if (status != MHE_OK) {
         skeleton_free(made);

@@ -12,8 +12,9 @@ extern "C" {
 
 typedef struct skeleton skeleton;
 
-/* `tree` must outlive the skeleton. [cold] */
-mhe_status skeleton_create(const tree *tree, skeleton **out, mhe_error *err);
+/* `tree` must outlive the skeleton. with_mass = 0: for poses alone. Simbody refuses inertias that
+ * no rigid body can have (triangle inequality), which files do hold. [cold] */
+mhe_status skeleton_create(const tree *tree, int32_t with_mass, skeleton **out, mhe_error *err);
 void skeleton_free(skeleton *skeleton); /* [cold] */
 
 /* Sets the joints to `angle` [n_joints] (rad or m) and writes the links' placement in ground: r
@@ -21,8 +22,9 @@ void skeleton_free(skeleton *skeleton); /* [cold] */
 mhe_status skeleton_place(skeleton *skeleton, const double *angle, double *r, double *p,
                           mhe_error *err);
 
-/* At the angles placed last: joint torques `torque` [n_joints] that give `acceleration` at `speed`
- * against gravity, and mass matrix M [n_joints x n_joints]; NULL: not wanted. [hot] */
+/* Of a skeleton with mass, at the angles placed last: joint torques `torque` [n_joints] that give
+ * `acceleration` at `speed` against gravity, and mass matrix M [n_joints x n_joints]; NULL: not
+ * wanted. [hot] */
 mhe_status skeleton_dynamics(skeleton *skeleton, const double *speed, const double *acceleration,
                              double *torque, double *mass, mhe_error *err);
 
