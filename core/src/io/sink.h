@@ -5,11 +5,13 @@
 
 #include <mhe/abi.h>
 
-/* A folder of result files. Nothing with a final name appears before mhi_outbox_commit. */
+/* A folder of result files. Nothing with a final name appears before mhi_outbox_commit; until then
+ * x.sto is .x.sto.tmp beside it. */
 typedef struct mhi_outbox mhi_outbox;
 /* Makes the folder (and its parents). MHE_E_IO: cannot. [cold] */
 mhe_status mhi_outbox_open(const char *dir, mhi_outbox **outbox, mhe_error *err);
-/* Flushes, syncs and renames every file of the outbox. */
+/* Flushes, syncs and renames every file of the outbox. No name changes before all files are safely
+ * on the disk; MHE_E_IO: they are not, or a name could not be changed. Sinks are gone after it. */
 mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err);
 /* Frees; without a commit before, the temporary files are removed. */
 void mhi_outbox_close(mhi_outbox *outbox);
@@ -27,7 +29,7 @@ mhe_status mhi_sink_trc(mhi_outbox *outbox, const char *name, const char *const 
                         int32_t n_markers, double rate, double unit, const char *unit_name,
                         mhi_sink **sink, mhe_error *err);
 /* Appends a row: [n_columns] or [3 n_markers]; NaN is written as nan (.sto) or left empty (.trc).
- */
+ * Rows are buffered: MHE_E_IO may come some rows late, but never later than the commit. */
 mhe_status mhi_sink_row(mhi_sink *sink, double time, const double *values, mhe_error *err);
 
 #endif

@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Rows of .sto and .trc. The number of rows stands in the header but is known last: the header is
+ * written again at the end, made as long as the first time by blanks behind its first, free line.
+ */
+#include "io/sink.h"
+
+#include "base/text.h"
+#include "io/number.h"
+#include "io/outbox.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct mhi_sink {
+    mhi_outbox_file *file;
+    char *first_line;
+    mhi_text header[3]; /* its further text; the number of rows stands between the parts */
+    int32_t n_counts;   /* how often: parts - 1 */
+    int32_t is_trc;
+    int32_t n_rows, n_columns;
+    double unit; /* metres per unit written */
+};
+
+#define COUNT_DIGITS 10 /* of INT32_MAX */
+
+static mhe_status write_header(const mhi_sink *sink, mhe_error *err) {
+    char count[16];
+    int32_t digits = snprintf(count, sizeof count, "%d", sink->n_rows);
+    int32_t pad = sink->n_counts * (COUNT_DIGITS - digits);
+    FILE *out = sink->file->stream;
+    int failed = fprintf(out, "%s%*s\n%s", sink->first_line, pad, "", sink->header[0].data) < 0;
+    for (int32_t i = 0; i < sink->n_counts && !failed; i++) {
+        failed = fprintf(out, "%s%s", count, sink->header[i + 1].data) < 0;
+    }
+    return failed ? mhi_outbox_write_failed(sink->file, err) : MHE_OK;
+}
+
+static mhe_status complete(mhi_outbox_file *file, mhe_error *err) {
+    const mhi_sink *sink = file->owner;
+    if (fseek(file->stream, 0, SEEK_SET) != 0) {
+        return mhi_outbox_write_failed(file, err);
+    }
+    return write_header(sink, err);
+}
+
+static void free_sink(mhi_sink *sink) {
+    for (int32_t i = 0; i < 3; i++) {
+        mhi_text_free(&sink->header[i]);
+    }
+    free(sink->first_line);
+    free(sink);
+}
+
+static void release(mhi_outbox_file *file) {
+    free_sink(file->owner);
+}
+
+/* Puts a sink whose header is ready into the outbox, or frees it. */
+static mhe_status open_sink(mhi_outbox *outbox, const char *name, mhi_sink *made, mhi_sink **sink,
+                            mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i <= made->n_counts; i++) {
+        if (made->header[i].failed || made->first_line == NULL) {
+            status = mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
+        }
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_add(outbox, name, &made->file, err);
+    }
+    if (status != MHE_OK) {
+        free_sink(made);
+        return status;
+    }
+    made->file->owner = made;
+    made->file->complete = complete;
+    made->file->release = release;
+    status = write_header(made, err);
+    *sink = status == MHE_OK ? made : NULL;
+    return status;
+}
+
+static mhi_sink *new_sink(int32_t n_columns, int32_t n_counts) {
+    mhi_sink *made = calloc(1, sizeof *made);
+    if (made != NULL) {
+        made->n_columns = n_columns;
+        made->n_counts = n_counts;
+        made->unit = 1;
+    }
+    return made;
+}
+
+mhe_status mhi_sink_sto(mhi_outbox *outbox, const char *name, const char *title,
+                        const char *const *labels, int32_t n_columns, mhi_sink **sink,
+                        mhe_error *err) {
+    *sink = NULL;
+    mhi_sink *made = new_sink(n_columns, 1);
+    if (made == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
+    }
+    made->first_line = strdup(title);
+    mhi_text_add(&made->header[0], "version=1\nnRows=");
+    mhi_text_add(&made->header[1], "\nnColumns=%d\ninDegrees=no\nendheader\ntime", n_columns + 1);
+    for (int32_t i = 0; i < n_columns; i++) {
+        mhi_text_add(&made->header[1], "\t%s", labels[i]);
+    }
+    mhi_text_add(&made->header[1], "\n");
+    return open_sink(outbox, name, made, sink, err);
+}
+
+mhe_status mhi_sink_trc(mhi_outbox *outbox, const char *name, const char *const *markers,
+                        int32_t n_markers, double rate, double unit, const char *unit_name,
+                        mhi_sink **sink, mhe_error *err) {
+    *sink = NULL;
+    mhi_sink *made = new_sink(3 * n_markers, 2);
+    if (made == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
+    }
+    mhi_c_locale locale = mhi_c_locale_begin();
+    mhi_text line = {0};
+    mhi_text_add(&line, "PathFileType\t4\t(X/Y/Z)\t%s", name);
+    made->first_line = line.data;
+    made->is_trc = 1;
+    made->unit = unit;
+    mhi_text_add(&made->header[0],
+                 "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\t"
+                 "OrigDataStartFrame\tOrigNumFrames\n%.10g\t%.10g\t",
+                 rate, rate);
+    mhi_text_add(&made->header[1], "\t%d\t%s\t%.10g\t1\t", n_markers, unit_name, rate);
+    mhi_text *rest = &made->header[2];
+    mhi_text_add(rest, "\nFrame#\tTime");
+    for (int32_t i = 0; i < n_markers; i++) {
+        mhi_text_add(rest, "\t%s%s", markers[i], i + 1 < n_markers ? "\t\t" : "");
+    }
+    mhi_text_add(rest, "\n\t");
+    for (int32_t i = 1; i <= n_markers; i++) {
+        mhi_text_add(rest, "\tX%d\tY%d\tZ%d", i, i, i);
+    }
+    mhi_text_add(rest, "\n\n");
+    mhi_c_locale_end(locale);
+    return open_sink(outbox, name, made, sink, err);
+}
+
+mhe_status mhi_sink_row(mhi_sink *sink, double time, const double *values, mhe_error *err) {
+    FILE *out = sink->file->stream;
+    mhi_c_locale locale = mhi_c_locale_begin();
+    int failed = sink->is_trc ? fprintf(out, "%d\t%.10g", sink->n_rows + 1, time) < 0
+                              : fprintf(out, "%.10g", time) < 0;
+    for (int32_t i = 0; i < sink->n_columns && !failed; i++) {
+        if (!isnan(values[i])) {
+            failed = fprintf(out, "\t%.12g", values[i] / sink->unit) < 0;
+        } else {
+            failed = fputs(sink->is_trc ? "\t" : "\tnan", out) < 0;
+        }
+    }
+    failed = failed || fputc('\n', out) == EOF || ferror(out);
+    mhi_c_locale_end(locale);
+    if (failed) {
+        return mhi_outbox_write_failed(sink->file, err);
+    }
+    sink->n_rows++;
+    return MHE_OK;
+}
