@@ -54,6 +54,7 @@ typedef struct mhi_bounds_section {
 
 typedef struct mhi_output_section {
     int32_t picture; /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t skip_first, skip_last; /* estimates left out of the errors in summary.json */
 } mhi_output_section;
 
 typedef struct mhi_run {

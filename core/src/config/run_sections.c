@@ -87,6 +87,10 @@ static const mhe_option solver_options[] = {
 static const mhe_option output_options[] = {
     MHE_OPT_BOOL(mhi_output_section, picture, 1,
                  "Draw estimated against reference, where gnuplot is installed."),
+    MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
+                "Estimates at the start that the errors in summary.json leave out."),
+    MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",
+                "Estimates at the end that the errors in summary.json leave out."),
 };
 
 #define SECTION(name, help, iface, table, offset) \
