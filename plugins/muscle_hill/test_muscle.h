@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* test_muscle.h: muscles of every kind for the tests of mhe.muscle.hill. */
+#ifndef MUSCLE_HILL_TEST_MUSCLE_H
+#define MUSCLE_HILL_TEST_MUSCLE_H
+
+#include "use.h"
+
+#include <math.h>
+#include <mhe/muscle.h>
+
+/* What a file says that states only what it must. */
+static inline mhe_muscle test_muscle(int32_t type, double f_max, double l_opt, double l_slack,
+                                     double pennation) {
+    return (mhe_muscle){.name = "sample",
+                        .type = type,
+                        .max_isometric_force = f_max,
+                        .optimal_fiber_length = l_opt,
+                        .tendon_slack_length = l_slack,
+                        .pennation_angle = pennation,
+                        .max_contraction_velocity = NAN,
+                        .activation_time = NAN,
+                        .deactivation_time = NAN,
+                        .fiber_damping = NAN,
+                        .passive_strain = NAN,
+                        .passive_shape = NAN,
+                        .active_shape = NAN,
+                        .velocity_shape = NAN,
+                        .max_lengthening_force = NAN};
+}
+
+/* An instance of the plugin; `ops` is NULL where creation failed with `err`. */
+struct test_hill {
+    const mhe_muscle_ops *ops;
+    void *self;
+    mhe_error err;
+};
+
+static inline struct test_hill test_hill(const mhe_muscle *muscles, int32_t n, const char *yaml) {
+    const mhe_plugin *plugin = test_plugin("mhe.muscle.hill", MHE_MUSCLE_IFACE);
+    struct test_hill hill = {0};
+    assert_non_null(plugin);
+    const mhe_muscle_ops *ops = plugin->ops;
+    if (ops->create(test_host(), muscles, n, test_config(plugin, yaml), &hill.self, &hill.err) ==
+        MHE_OK) {
+        hill.ops = ops;
+    }
+    return hill;
+}
+
+#endif
