@@ -23,14 +23,18 @@ static void fill(char *out, const char *pattern, const char *name, int32_t numbe
     }
 }
 
+/* Numbered columns count from 0 where there is a number 0, else from 1. */
 static int32_t find(const mhi_table *table, const mhi_naming *naming, const char *name,
-                    int32_t number) {
+                    int32_t position) {
     char label[NAME_LENGTH];
     for (size_t p = 0; p < sizeof naming->patterns / sizeof naming->patterns[0]; p++) {
         if (naming->patterns[p] == NULL) {
             break;
         }
-        fill(label, naming->patterns[p], name, number);
+        fill(label, naming->patterns[p], name, 0);
+        const int from_zero =
+            strstr(naming->patterns[p], "%d") != NULL && mhi_table_find(table, label) >= 0;
+        fill(label, naming->patterns[p], name, from_zero ? position : position + 1);
         const int32_t column = mhi_table_find(table, label);
         if (column >= 0) {
             return column;
@@ -81,7 +85,7 @@ mhe_status mhi_columns_match(const mhi_table *table, const mhi_naming *naming,
     mhi_text missing = {0};
     *n_found = 0;
     for (int32_t i = 0; i < n; i++) {
-        column[i] = find(table, naming, names[i], i + 1);
+        column[i] = find(table, naming, names[i], i);
         if (column[i] >= 0) {
             used[column[i]] = 1;
             *n_found += 1;

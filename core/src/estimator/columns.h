@@ -9,7 +9,7 @@
 #include <mhe/host.h>
 
 /* How the columns of one quantity may be called: any of the patterns, where %s stands for the
- * model's name and %d for its 1-based number. */
+ * model's name and %d for its number, counted from 0 or 1. */
 typedef struct mhi_naming {
     const char *what;        /* "marker", "muscle": for messages */
     const char *patterns[6]; /* NULL-terminated */
