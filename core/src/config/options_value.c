@@ -3,8 +3,8 @@
  * is wrong and what would be right. */
 #include "config/options_value.h"
 
-#include "config/number.h"
 #include "config/options_table.h"
+#include "config/yaml_scalar.h"
 
 #include <float.h>
 
@@ -80,7 +80,7 @@ static const char *remedy(const mhe_option *option, const mhi_node *node) {
     if (node->quoted && (is_number_type(option) || option->type == MHE_TYPE_BOOL)) {
         return "; leave out the quotes";
     }
-    if (option->type == MHE_TYPE_REAL_LIST && mhi_number_read(node->text, &value)) {
+    if (option->type == MHE_TYPE_REAL_LIST && mhi_yaml_number(node->text, &value)) {
         return "; put it in brackets";
     }
     if (is_number_type(option) && strpbrk(node->text, " ,") != NULL) {
@@ -99,7 +99,7 @@ static mhe_status wrong_type(const mhi_filler *f, const mhe_option *option, cons
 
 static mhe_status check_range(const mhi_filler *f, const mhe_option *option, const mhi_node *node,
                               double value) {
-    char low[MHI_NUMBER_SIZE], high[MHI_NUMBER_SIZE], is[SHOWN];
+    char low[MHI_YAML_REAL_SIZE], high[MHI_YAML_REAL_SIZE], is[SHOWN];
     if (value >= option->min && value <= option->max) {
         return MHE_OK;
     }
@@ -107,8 +107,8 @@ static mhe_status check_range(const mhi_filler *f, const mhe_option *option, con
     if (isinf(value)) {
         return mhi_filler_refuse(f, node, "'%s' must be finite, not %s", option->key, is);
     }
-    mhi_number_write(option->min, low);
-    mhi_number_write(option->max, high);
+    mhi_yaml_real(option->min, low);
+    mhi_yaml_real(option->max, high);
     double largest = option->type == MHE_TYPE_INT ? INT32_MAX : DBL_MAX;
     if (option->max >= largest) {
         return mhi_filler_refuse(f, node, "'%s' must be at least %s, not %s", option->key, low, is);
@@ -122,7 +122,7 @@ static mhe_status check_range(const mhi_filler *f, const mhe_option *option, con
 
 static mhe_status read_real(const mhi_filler *f, const mhe_option *option, const mhi_node *node,
                             double *out) {
-    if (node->kind != MHI_SCALAR || node->quoted || !mhi_number_read(node->text, out)) {
+    if (node->kind != MHI_SCALAR || node->quoted || !mhi_yaml_number(node->text, out)) {
         return wrong_type(f, option, node);
     }
     return check_range(f, option, node, *out);
@@ -131,7 +131,7 @@ static mhe_status read_real(const mhi_filler *f, const mhe_option *option, const
 static mhe_status read_int(const mhi_filler *f, const mhe_option *option, const mhi_node *node,
                            int32_t *out) {
     double value = 0;
-    if (node->kind != MHI_SCALAR || node->quoted || !mhi_number_read(node->text, &value) ||
+    if (node->kind != MHI_SCALAR || node->quoted || !mhi_yaml_number(node->text, &value) ||
         value != floor(value)) { /* 1e3 and 7.0 are integers */
         return wrong_type(f, option, node);
     }

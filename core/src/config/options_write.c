@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* options_write.c: a filled config as YAML that reads back the same. */
-#include "config/number.h"
 #include "config/options.h"
 #include "config/options_table.h"
-#include "config/yaml_text.h"
+#include "config/yaml_scalar.h"
 
 static void write_real(double value, mhi_text *out) {
-    char number[MHI_NUMBER_SIZE];
-    mhi_text_add(out, "%s", mhi_number_write(value, number));
+    char number[MHI_YAML_REAL_SIZE];
+    mhi_text_add(out, "%s", mhi_yaml_real(value, number));
 }
 
 static void write_value(const mhe_option *option, const void *field, mhi_text *out) {

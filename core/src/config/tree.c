@@ -4,8 +4,8 @@
 
 #include "base/arena.h"
 #include "config/tree_yaml.h"
+#include "io/slurp.h"
 
-#include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -48,29 +48,17 @@ mhe_status mhi_tree_parse(const char *name, const char *text, size_t length, mhi
 }
 
 mhe_status mhi_tree_read(const char *path, mhi_tree **tree, mhe_error *err) {
+    char *text = NULL;
+    size_t length = 0;
     *tree = NULL;
-    FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        return mhe_fail(err, MHE_E_INPUT, "%s: cannot be opened: %s", path, strerror(errno));
-    }
-    mhe_status status = MHE_OK;
-    char *text = malloc(MAX_BYTES + 1);
-    if (text == NULL) {
-        status = mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", path);
-    } else {
-        errno = 0;
-        size_t length = fread(text, 1, MAX_BYTES + 1, file);
-        if (ferror(file)) {
-            status = mhe_fail(err, MHE_E_INPUT, "%s: cannot be read: %s", path, strerror(errno));
-        } else if (length > MAX_BYTES) {
-            status = mhe_fail(err, MHE_E_INPUT, "%s: larger than %zu bytes: not a configuration",
-                              path, MAX_BYTES);
-        } else {
-            status = mhi_tree_parse(path, text, length, tree, err);
-        }
+    mhe_status status = mhi_slurp(path, &text, &length, err);
+    if (status == MHE_OK) {
+        status = length > MAX_BYTES
+                     ? mhe_fail(err, MHE_E_INPUT, "%s: larger than %zu bytes: not a configuration",
+                                path, MAX_BYTES)
+                     : mhi_tree_parse(path, text, length, tree, err);
     }
     free(text);
-    (void)fclose(file);
     return status;
 }
 

@@ -1,8 +1,47 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "config/yaml_text.h"
+#include "config/yaml_scalar.h"
 
+#include "io/number.h"
+
+#include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+
+/* ---- numbers ---- */
+
+static int infinite(const char *text) {
+    text += *text == '+' || *text == '-';
+    return strcmp(text, ".inf") == 0 || strcmp(text, ".Inf") == 0 || strcmp(text, ".INF") == 0;
+}
+
+int32_t mhi_yaml_number(const char *text, double *value) {
+    if (infinite(text)) {
+        *value = *text == '-' ? -INFINITY : INFINITY;
+        return 1;
+    }
+    mhi_c_locale saved = mhi_c_locale_begin();
+    int32_t read = mhi_number((mhi_cell){text, strlen(text)}, value);
+    mhi_c_locale_end(saved);
+    return read;
+}
+
+const char *mhi_yaml_real(double value, char out[MHI_YAML_REAL_SIZE]) {
+    if (isinf(value)) {
+        return strcpy(out, value > 0 ? ".inf" : "-.inf");
+    }
+    mhi_c_locale saved = mhi_c_locale_begin();
+    for (int digits = 15; digits <= 17; digits++) {
+        (void)snprintf(out, MHI_YAML_REAL_SIZE, "%.*g", digits, value);
+        if (strtod(out, NULL) == value) {
+            break;
+        }
+    }
+    mhi_c_locale_end(saved);
+    return out;
+}
+
+/* ---- texts ---- */
 
 /* Words that some reader of YAML takes for something else than text. */
 static int is_reserved(const char *text, size_t length) {
