@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* description_builder.h: what a model file says, collected under names, then checked, ordered and
+ * turned into a description. Shared by the model readers.
+ *
+ * Errors are sticky: the first one is kept in `status` and the caller's mhe_error, later ones are
+ * dropped, so that a reader need only look at `status` where it decides whether to go on. */
+#ifndef MHI_DESCRIPTION_BUILDER_H
+#define MHI_DESCRIPTION_BUILDER_H
+
+#include "base/arena.h"
+
+#include <mhe/description.h>
+
+/* Pointers to things that live in the builder's arena; {0} is empty. */
+typedef struct mhi_list {
+    void **items;
+    int32_t n, capacity;
+} mhi_list;
+
+/* A place on a body named as in the file. */
+typedef struct mhi_point_draft {
+    const char *body; /* NULL or "ground": ground */
+    double location[3];
+    int32_t line;
+} mhi_point_draft;
+
+typedef struct mhi_body_draft {
+    mhe_body body;      /* parent and motions are filled in by the builder */
+    const char *parent; /* NULL or "ground": ground */
+    mhi_list motions;   /* mhe_motion; their coordinate counts all coordinates, locked ones too */
+    int32_t line;
+    int32_t carried; /* for the reader: the joint has been seen */
+} mhi_body_draft;
+
+typedef struct mhi_coordinate_draft {
+    mhe_coordinate coordinate;
+    int32_t locked; /* stays at its default value */
+    int32_t line;
+} mhi_coordinate_draft;
+
+typedef struct mhi_marker_draft {
+    const char *name;
+    mhi_point_draft point;
+} mhi_marker_draft;
+
+typedef struct mhi_muscle_draft {
+    mhe_muscle muscle; /* points are filled in by the builder */
+    mhi_list points;   /* mhi_point_draft, in path order */
+    int32_t line;
+} mhi_muscle_draft;
+
+typedef struct mhi_builder {
+    mhi_arena arena;
+    const char *source; /* name of the file, for messages */
+    const char *name;   /* of the model; NULL: the file's base name */
+    double gravity[3];
+    mhi_list bodies, coordinates, markers, muscles; /* the drafts above, in file order */
+    mhi_list unsupported, warnings;                 /* char */
+    mhe_status status;
+    mhe_error *err;
+} mhi_builder;
+
+void mhi_build_start(mhi_builder *b, const char *source, mhe_error *err);
+/* Checks names, numbers and the tree, then hands over the description; on failure everything is
+ * freed. `b` is empty afterwards. */
+mhe_status mhi_build_finish(mhi_builder *b, mhe_description **description);
+/* Gives everything back without a description and returns the status. */
+mhe_status mhi_build_abandon(mhi_builder *b);
+
+/* Each writes "file:line: ..."; line 0 leaves the line out. */
+MHE_PRINTF(3, 4) void mhi_build_fail(mhi_builder *b, int32_t line, const char *format, ...);
+MHE_PRINTF(3, 4) void mhi_build_warn(mhi_builder *b, int32_t line, const char *format, ...);
+MHE_PRINTF(3, 4) void mhi_build_unsupported(mhi_builder *b, int32_t line, const char *format, ...);
+
+/* Appends to a list zeroed memory of `bytes`; NULL, with the status set, when memory is out. */
+void *mhi_build_push(mhi_builder *b, mhi_list *list, size_t bytes);
+/* New drafts with neutral values (identity transforms, unbounded range, NaN muscle parameters).
+ * Names are kept, not copied. NULL when memory is out. */
+mhi_body_draft *mhi_build_body(mhi_builder *b, const char *name, const char *parent, int32_t line);
+mhi_coordinate_draft *mhi_build_coordinate(mhi_builder *b, const char *name, int32_t line);
+void mhi_build_marker(mhi_builder *b, const char *name, const char *body, const double location[3],
+                      int32_t line);
+mhi_muscle_draft *mhi_build_muscle(mhi_builder *b, const char *name, int32_t line);
+void mhi_build_point(mhi_builder *b, mhi_muscle_draft *muscle, const char *body,
+                     const double location[3], int32_t line);
+/* `coordinate` -1: the constant function(0). A motion that is always 0 is left out. */
+void mhi_build_motion(mhi_builder *b, mhi_body_draft *body, int32_t kind, int32_t coordinate,
+                      const double axis[3], mhe_function function, int32_t line);
+
+/* Parts of mhi_build_finish (description_frames.c). Refuses a frame that is no rotation, within the
+ * rounding of model files. */
+void mhi_build_check_rotation(mhi_builder *b, const mhi_body_draft *draft, const double r[9]);
+/* Turns the left-handed frames that some converters write (a pair of them cancels) into
+ * right-handed ones by flipping z of bodies that do not move; mirrored [n] says which, for points
+ * on them. */
+void mhi_build_right_handed(mhi_builder *b, mhe_body *bodies, int32_t n, int32_t *mirrored);
+
+/* 1 where the two names are the same without regard to letter case. */
+int32_t mhi_same_word(const char *a, const char *b);
+
+/* Rigid transforms, rotation row-major [3 x 3]. */
+typedef struct mhi_transform {
+    double r[9], p[3];
+} mhi_transform;
+
+mhi_transform mhi_transform_identity(void);
+mhi_transform mhi_transform_times(const mhi_transform *a, const mhi_transform *b);
+mhi_transform mhi_transform_inverse(const mhi_transform *a);
+void mhi_transform_point(const mhi_transform *a, const double point[3], double out[3]);
+/* Turns about the body-fixed axes sequence[0..2] ('x' 'y' 'z') by angles[0..2], in this order. */
+void mhi_rotation_sequence(const char *sequence, const double angles[3], double r[9]);
+
+/* Functions; memory from the builder. Splines and broken lines need n >= 2 points with increasing
+ * x: the reader checks. */
+mhe_function mhi_function_polynomial(mhi_builder *b, const double coef[4]); /* c0 + c1 t + ... */
+mhe_function mhi_function_broken_line(mhi_builder *b, const double *x, const double *y, int32_t n);
+/* The cubic spline of SIMM and OpenSim (SimmSpline): third derivatives at the ends are those of the
+ * cubics through the four outermost points (Forsythe, Malcolm & Moler, Computer Methods for
+ * Mathematical Computations, 1977, ch. 4); linear beyond the ends. */
+mhe_function mhi_function_spline(mhi_builder *b, const double *x, const double *y, int32_t n);
+mhe_function mhi_function_scaled(mhi_builder *b, double scale, mhe_function function);
+double mhi_function_value(const mhe_function *function, double t);
+
+#endif

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* osim.c: OpenSim model reader, layouts of OpenSim 2.x to 4.x. */
+#include "io/osim.h"
+#include "io/model_file.h"
+#include "io/number.h"
+
+#include <limits.h>
+#include <string.h>
+
+#include <libxml/parser.h>
+
+static int32_t is_one_of(const xmlNode *node, const char *const *tags, size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (mhi_xml_is(node, tags[i])) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Objects of a set that act on the motion, unless they say that they are switched off. */
+static void list_set(mhi_osim *o, const char *set) {
+    for (xmlNode *n = mhi_xml_objects(o, o->model, set); n != NULL; n = mhi_xml_next(n)) {
+        const char *on = mhi_xml_word(o, n, "isEnforced");
+        on = on != NULL ? on : mhi_xml_word(o, n, "enabled");
+        if (!mhi_xml_flag(o, n, "isDisabled") && (on == NULL || !mhi_same_word(on, "false"))) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "%s '%s'", (const char *)n->name,
+                                  mhi_xml_name(o, n));
+        }
+    }
+}
+
+static void list_components(mhi_osim *o, xmlNode *holder) {
+    static const char *const harmless[] = {"PhysicalOffsetFrame", "Station", "Marker"};
+    for (xmlNode *n = mhi_xml_first(holder); n != NULL; n = mhi_xml_next(n)) {
+        if (!is_one_of(n, harmless, sizeof harmless / sizeof *harmless)) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "component %s '%s'",
+                                  (const char *)n->name, mhi_xml_name(o, n));
+        }
+    }
+}
+
+/* Elements of <Model> that are read elsewhere or have no part in the mechanics; a
+ * ContactGeometrySet alone makes no force, a wrap object that no path names neither. */
+static void list_unknown(mhi_osim *o) {
+    static const char *const known[] = {
+        "credits",         "publications",       "length_units",  "force_units",
+        "gravity",         "assembly_accuracy",  "Ground",        "BodySet",
+        "JointSet",        "ForceSet",           "MarkerSet",     "ConstraintSet",
+        "ControllerSet",   "ContactGeometrySet", "ProbeSet",      "ComponentSet",
+        "components",      "defaults",           "WrapObjectSet", "ModelVisualPreferences",
+        "ModelVisualizer", "show_visualizer",    "FrameSet",      "frames",
+        "notes",           "model_version"};
+    for (xmlNode *n = mhi_xml_first(o->model); n != NULL; n = mhi_xml_next(n)) {
+        if (!is_one_of(n, known, sizeof known / sizeof *known)) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>", (const char *)n->name);
+        }
+    }
+}
+
+static void read_markers(mhi_osim *o) {
+    for (xmlNode *n = mhi_xml_objects(o, o->model, "MarkerSet"); n != NULL; n = mhi_xml_next(n)) {
+        const char *body;
+        double location[3];
+        if (mhi_xml_is(n, "Marker") && mhi_osim_location(o, n, &body, location)) {
+            mhi_build_marker(&o->b, mhi_xml_name(o, n), body, location, mhi_xml_line(n));
+        }
+    }
+}
+
+/* A body that no joint carries floats freely in OpenSim. */
+static void check_carried(mhi_osim *o) {
+    for (int32_t i = 0; i < o->b.bodies.n; i++) {
+        const mhi_body_draft *draft = o->b.bodies.items[i];
+        if (!draft->carried) {
+            mhi_build_unsupported(&o->b, draft->line, "body '%s' without a joint (held by ground)",
+                                  draft->body.name);
+        }
+    }
+}
+
+static void read_model(mhi_osim *o) {
+    const char *name = mhi_xml_name(o, o->model);
+    o->b.name = *name != '\0' ? name : NULL;
+    (void)mhi_xml_numbers(o, o->model, "gravity", o->b.gravity, 3);
+    mhi_osim_frames(o);
+    mhi_osim_bodies(o);
+    for (xmlNode *n = mhi_xml_objects(o, o->model, "JointSet"); n != NULL && o->b.status == MHE_OK;
+         n = mhi_xml_next(n)) {
+        mhi_osim_joint(o, n, NULL);
+    }
+    check_carried(o);
+    mhi_osim_forces(o);
+    read_markers(o);
+    list_set(o, "ConstraintSet");
+    list_set(o, "ControllerSet");
+    list_components(o, mhi_xml_child(o->model, "components"));
+    list_components(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"));
+    list_unknown(o);
+}
+
+static void read_document(mhi_osim *o, xmlDoc *document) {
+    xmlNode *root = xmlDocGetRootElement(document);
+    if (document->intSubset != NULL) { /* entities: none is needed, and some are bombs */
+        mhi_build_fail(&o->b, 0, "a document type declaration has no place in a model file");
+        return;
+    }
+    if (root == NULL || !mhi_xml_is(root, "OpenSimDocument")) {
+        mhi_build_fail(&o->b, root != NULL ? mhi_xml_line(root) : 0,
+                       "not an OpenSim model: the outermost element is <%s>, not "
+                       "<OpenSimDocument>",
+                       root != NULL ? (const char *)root->name : "");
+        return;
+    }
+    o->model = mhi_xml_child(root, "Model");
+    if (o->model == NULL) {
+        mhi_build_fail(&o->b, mhi_xml_line(root), "<OpenSimDocument> holds no <Model>");
+        return;
+    }
+    read_model(o);
+}
+
+/* libxml2's message without its line end. */
+static void fail_syntax(mhi_osim *o, xmlParserCtxt *context) {
+    const xmlError *problem = xmlCtxtGetLastError(context);
+    const char *text = problem != NULL && problem->message != NULL ? problem->message : "not XML";
+    mhi_build_fail(&o->b, problem != NULL ? problem->line : 0, "%.*s", (int)strcspn(text, "\r\n"),
+                   text);
+}
+
+mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
+                          mhe_description **description, mhe_error *err) {
+    mhi_osim o = {0};
+    *description = NULL;
+    mhi_build_start(&o.b, name, err);
+    o.b.gravity[1] = -9.80665;
+    if (length > INT_MAX) {
+        mhi_build_fail(&o.b, 0, "the file is too large");
+        return mhi_build_abandon(&o.b);
+    }
+    xmlParserCtxt *context = xmlNewParserCtxt();
+    if (context == NULL) {
+        o.b.status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        return mhi_build_abandon(&o.b);
+    }
+    mhi_c_locale saved = mhi_c_locale_begin();
+    xmlDoc *document = xmlCtxtReadMemory(context, text, (int)length, NULL, NULL,
+                                         XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING |
+                                             XML_PARSE_BIG_LINES);
+    if (document == NULL) {
+        fail_syntax(&o, context);
+    } else {
+        read_document(&o, document);
+    }
+    xmlFreeDoc(document);
+    xmlFreeParserCtxt(context);
+    mhi_c_locale_end(saved);
+    return mhi_build_finish(&o.b, description);
+}

@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* osim_frame.c: sockets, offset frames, and the bodies they lead to. */
+#include "base/text.h"
+#include "io/osim.h"
+
+#include <string.h>
+
+#define FRAME(o, i) ((mhi_osim_frame *)(o)->frames.items[i])
+
+/* Offset frames among the children of `holder`, which live at `owner`. */
+static void collect(mhi_osim *o, xmlNode *holder, const char *owner) {
+    for (xmlNode *node = mhi_xml_first(holder); node != NULL; node = mhi_xml_next(node)) {
+        if (!mhi_xml_is(node, "PhysicalOffsetFrame")) {
+            continue;
+        }
+        mhi_osim_frame *frame = mhi_build_push(&o->b, &o->frames, sizeof *frame);
+        if (frame == NULL) {
+            return;
+        }
+        double angles[3] = {0};
+        frame->path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, node));
+        frame->owner = owner;
+        frame->parent = mhi_osim_socket(o, node, "parent");
+        frame->line = mhi_xml_line(node);
+        (void)mhi_xml_numbers(o, node, "orientation", angles, 3);
+        (void)mhi_xml_numbers(o, node, "translation", frame->in_parent.p, 3);
+        mhi_rotation_sequence("xyz", angles, frame->in_parent.r);
+        if (frame->path == NULL) {
+            o->frames.n--;
+            return;
+        }
+        collect(o, mhi_xml_child(node, "components"), frame->path);
+    }
+}
+
+static const char *member(mhi_osim *o, const char *owner, const xmlNode *node) {
+    const char *path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, node));
+    return path != NULL ? path : "";
+}
+
+void mhi_osim_frames(mhi_osim *o) {
+    collect(o, mhi_xml_child(o->model, "components"), "");
+    collect(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"), "/componentset");
+    collect(o, mhi_xml_child(mhi_xml_child(o->model, "Ground"), "components"), "/ground");
+    for (xmlNode *n = mhi_xml_objects(o, o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
+        collect(o, mhi_xml_child(n, "components"), member(o, "/bodyset", n));
+    }
+    for (xmlNode *n = mhi_xml_objects(o, o->model, "JointSet"); n != NULL; n = mhi_xml_next(n)) {
+        const char *joint = member(o, "/jointset", n);
+        collect(o, mhi_xml_child(n, "frames"), joint);
+        collect(o, mhi_xml_child(n, "components"), joint);
+    }
+}
+
+const char *mhi_osim_socket(mhi_osim *o, xmlNode *object, const char *name) {
+    static const struct {
+        const char *before, *after;
+    } spellings[] = {
+        {"socket_", ""}, {"socket_", "_connectee_name"}, {"connector_", "_connectee_name"}};
+    const char *text = NULL;
+    for (size_t i = 0; text == NULL && i < sizeof spellings / sizeof *spellings; i++) {
+        char tag[64];
+        (void)snprintf(tag, sizeof tag, "%s%s%s", spellings[i].before, name, spellings[i].after);
+        text = mhi_xml_word(o, object, tag);
+    }
+    return text;
+}
+
+/* "../ground" seen from "/jointset/elbow" -> "/jointset/ground"; an absolute path as it is. */
+static const char *absolute(mhi_osim *o, const char *socket, const char *owner) {
+    char *out = mhi_arena_take(&o->b.arena, strlen(owner) + strlen(socket) + 3);
+    if (out == NULL) {
+        return "";
+    }
+    strcpy(out, *socket == '/' ? "" : owner);
+    while (*socket != '\0') {
+        size_t length = strcspn(socket, "/");
+        if (length == 2 && strncmp(socket, "..", 2) == 0) {
+            char *slash = strrchr(out, '/');
+            *(slash != NULL ? slash : out) = '\0';
+        } else if (length > 0 && !(length == 1 && *socket == '.')) {
+            strcat(out, "/");
+            strncat(out, socket, length);
+        }
+        socket += length + (socket[length] == '/');
+    }
+    return out;
+}
+
+static const char *last_part(const char *path) {
+    const char *slash = strrchr(path, '/');
+    return slash != NULL ? slash + 1 : path;
+}
+
+static const char *body_named(const mhi_osim *o, const char *name) {
+    for (int32_t i = 0; i < o->b.bodies.n; i++) {
+        const mhi_body_draft *draft = o->b.bodies.items[i];
+        if (strcmp(draft->body.name, name) == 0) {
+            return draft->body.name;
+        }
+    }
+    return NULL;
+}
+
+/* The frame at `path`, else, by its last part, one of the owner's own, else any. */
+static mhi_osim_frame *frame_named(const mhi_osim *o, const char *path, const char *owner) {
+    mhi_osim_frame *own = NULL, *any = NULL;
+    for (int32_t i = 0; i < o->frames.n; i++) {
+        mhi_osim_frame *frame = FRAME(o, i);
+        if (strcmp(frame->path, path) == 0) {
+            return frame;
+        }
+        if (strcmp(last_part(frame->path), last_part(path)) == 0) {
+            own = own == NULL && strcmp(frame->owner, owner) == 0 ? frame : own;
+            any = any == NULL ? frame : any;
+        }
+    }
+    return own != NULL ? own : any;
+}
+
+static void fail_unknown(mhi_osim *o, const char *socket, int32_t line) {
+    int32_t n = o->b.bodies.n;
+    const char **names = MHI_TAKE(&o->b.arena, const char *, n + 1);
+    char hint[256] = "";
+    for (int32_t i = 0; names != NULL && i < n; i++) {
+        names[i] = ((mhi_body_draft *)o->b.bodies.items[i])->body.name;
+    }
+    if (names != NULL) {
+        names[n] = "ground";
+        mhi_suggest(hint, sizeof hint, last_part(socket), names, n + 1);
+    }
+    mhi_build_fail(&o->b, line, "'%s' is no body or frame%s", socket, hint);
+}
+
+int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int32_t line,
+                         const char **body, mhi_transform *in_body) {
+    *body = NULL;
+    *in_body = mhi_transform_identity();
+    if (socket == NULL) {
+        mhi_build_fail(&o->b, line, "this element is attached to nothing");
+        return 0;
+    }
+    const char *path = absolute(o, socket, owner), *name = last_part(path);
+    mhi_osim_frame *frame = frame_named(o, path, owner);
+    int32_t exact = frame != NULL && strcmp(frame->path, path) == 0;
+    *body = body_named(o, name);
+    /* a bare name may be that of a frame of the joint itself, and of a body elsewhere */
+    int32_t own = frame != NULL && strcmp(frame->owner, owner) == 0 && *socket != '/';
+    if (!exact && !own && (*body != NULL || mhi_same_word(name, "ground"))) {
+        return 1;
+    }
+    if (frame == NULL) {
+        fail_unknown(o, socket, line);
+        return 0;
+    }
+    if (frame->visiting) {
+        mhi_build_fail(&o->b, frame->line, "frame '%s' is fixed to itself", frame->path);
+        return 0;
+    }
+    mhi_transform parent;
+    frame->visiting = 1;
+    int32_t ok = mhi_osim_resolve(o, frame->parent, frame->path, frame->line, body, &parent);
+    frame->visiting = 0;
+    *in_body = mhi_transform_times(&parent, &frame->in_parent);
+    return ok;
+}
+
+int32_t mhi_osim_location(mhi_osim *o, xmlNode *object, const char **body, double location[3]) {
+    const char *socket = mhi_osim_socket(o, object, "parent_frame");
+    mhi_transform in_body;
+    double point[3] = {0};
+    if (socket == NULL) {
+        socket = mhi_xml_word(o, object, "body");
+    }
+    (void)mhi_xml_numbers(o, object, "location", point, 3);
+    if (!mhi_osim_resolve(o, socket, "", mhi_xml_line(object), body, &in_body)) {
+        return 0;
+    }
+    mhi_transform_point(&in_body, point, location);
+    return 1;
+}

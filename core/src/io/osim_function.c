@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* osim_function.c: OpenSim's functions of one variable as rows of cubic pieces. */
+#include "io/osim.h"
+
+#include <string.h>
+
+/* The function element of a holder: named "function", within <function>, or the one child that is
+ * nothing else. */
+static xmlNode *function_element(xmlNode *holder) {
+    xmlNode *wrapper = mhi_xml_child(holder, "function");
+    if (wrapper != NULL) {
+        return mhi_xml_first(wrapper);
+    }
+    xmlNode *node = mhi_xml_first(holder);
+    while (node != NULL && (mhi_xml_is(node, "coordinates") || mhi_xml_is(node, "axis") ||
+                            mhi_xml_is(node, "scale"))) {
+        node = mhi_xml_next(node);
+    }
+    return node;
+}
+
+static int32_t read_linear(mhi_osim *o, xmlNode *node, const char *whose, mhe_function *function) {
+    double c[2] = {1, 0};
+    (void)whose;
+    (void)mhi_xml_numbers(o, node, "coefficients", c, 2);
+    *function = mhi_function_polynomial(&o->b, (const double[4]){c[1], c[0]});
+    return 1;
+}
+
+static int32_t read_constant(mhi_osim *o, xmlNode *node, const char *whose,
+                             mhe_function *function) {
+    double value = 0;
+    (void)whose;
+    (void)mhi_xml_numbers(o, node, "value", &value, 1);
+    *function = mhi_function_polynomial(&o->b, (const double[4]){value});
+    return 1;
+}
+
+/* Coefficients with the highest power first. */
+static int32_t read_polynomial(mhi_osim *o, xmlNode *node, const char *whose,
+                               mhe_function *function) {
+    int32_t n;
+    const double *c = mhi_xml_all_numbers(o, mhi_xml_property(node, "coefficients"), &n);
+    double coef[4] = {0};
+    if (c == NULL) {
+        return -1;
+    }
+    if (n > 4) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node), "PolynomialFunction of degree %d of %s",
+                              (int)n - 1, whose);
+        return -1;
+    }
+    for (int32_t i = 0; i < n; i++) {
+        coef[i] = c[n - 1 - i];
+    }
+    *function = mhi_function_polynomial(&o->b, coef);
+    return 1;
+}
+
+/* x and y of a spline or broken line; 0 after an error. */
+static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const double **x,
+                           const double **y, int32_t *n) {
+    int32_t n_y;
+    *x = mhi_xml_all_numbers(o, mhi_xml_property(node, "x"), n);
+    *y = mhi_xml_all_numbers(o, mhi_xml_property(node, "y"), &n_y);
+    if (*x == NULL || *y == NULL || *n != n_y || *n < 2) {
+        mhi_build_fail(&o->b, mhi_xml_line(node),
+                       "<%s> of %s needs as many x as y, at least 2 (has %d and %d)",
+                       (const char *)node->name, whose, (int)*n, (int)n_y);
+        return 0;
+    }
+    for (int32_t i = 1; i < *n; i++) {
+        if ((*x)[i] <= (*x)[i - 1]) {
+            mhi_build_fail(&o->b, mhi_xml_line(node), "<%s> of %s: x does not increase at %g",
+                           (const char *)node->name, whose, (*x)[i]);
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int32_t read_spline(mhi_osim *o, xmlNode *node, const char *whose, mhe_function *function) {
+    const double *x, *y;
+    int32_t n;
+    if (!read_points(o, node, whose, &x, &y, &n)) {
+        return -1;
+    }
+    *function = mhi_function_spline(&o->b, x, y, n);
+    return 1;
+}
+
+static int32_t read_broken_line(mhi_osim *o, xmlNode *node, const char *whose,
+                                mhe_function *function) {
+    const double *x, *y;
+    int32_t n;
+    if (!read_points(o, node, whose, &x, &y, &n)) {
+        return -1;
+    }
+    *function = mhi_function_broken_line(&o->b, x, y, n);
+    return 1;
+}
+
+static int32_t read_multiplier(mhi_osim *o, xmlNode *node, const char *whose,
+                               mhe_function *function) {
+    double scale = 1;
+    mhe_function inner = {0};
+    (void)mhi_xml_numbers(o, node, "scale", &scale, 1);
+    int32_t found = mhi_osim_function(o, node, whose, &inner);
+    if (found == 1) {
+        *function = mhi_function_scaled(&o->b, scale, inner);
+    }
+    return found;
+}
+
+int32_t mhi_osim_function(mhi_osim *o, xmlNode *holder, const char *whose, mhe_function *function) {
+    static const struct {
+        const char *tag;
+        int32_t (*read)(mhi_osim *, xmlNode *, const char *, mhe_function *);
+    } readers[] = {{"LinearFunction", read_linear},
+                   {"Constant", read_constant},
+                   {"SimmSpline", read_spline},
+                   {"NaturalCubicSpline", read_spline},
+                   {"natCubicSpline", read_spline},
+                   {"PiecewiseLinearFunction", read_broken_line},
+                   {"PolynomialFunction", read_polynomial},
+                   {"MultiplierFunction", read_multiplier}};
+    xmlNode *node = function_element(holder);
+    if (node == NULL) {
+        return 0;
+    }
+    for (size_t i = 0; i < sizeof readers / sizeof *readers; i++) {
+        if (mhi_xml_is(node, readers[i].tag)) {
+            int32_t found = readers[i].read(o, node, whose, function);
+            return o->b.status == MHE_OK ? found : -1;
+        }
+    }
+    mhi_build_unsupported(&o->b, mhi_xml_line(node), "function <%s> of %s",
+                          (const char *)node->name, whose);
+    return -1;
+}

@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "io/number.h"
+#include "io/osim.h"
+
+#include <ctype.h>
+#include <string.h>
+
+static xmlNode *element(xmlNode *node) {
+    while (node != NULL && node->type != XML_ELEMENT_NODE) {
+        node = node->next;
+    }
+    return node;
+}
+
+xmlNode *mhi_xml_first(xmlNode *parent) {
+    return parent == NULL ? NULL : element(parent->children);
+}
+
+xmlNode *mhi_xml_next(xmlNode *node) {
+    return element(node->next);
+}
+
+int32_t mhi_xml_is(const xmlNode *node, const char *name) {
+    return strcmp((const char *)node->name, name) == 0;
+}
+
+xmlNode *mhi_xml_child(xmlNode *parent, const char *name) {
+    xmlNode *node = mhi_xml_first(parent);
+    while (node != NULL && !mhi_xml_is(node, name)) {
+        node = mhi_xml_next(node);
+    }
+    return node;
+}
+
+int32_t mhi_xml_line(const xmlNode *node) {
+    return (int32_t)xmlGetLineNo(node);
+}
+
+xmlNode *mhi_xml_property(xmlNode *object, const char *name) {
+    xmlNode *found = mhi_xml_child(object, name);
+    for (xmlNode *around = object->parent; found == NULL && around != NULL;
+         around = around->parent) {
+        if (around->type == XML_ELEMENT_NODE && !mhi_xml_is(around, "defaults")) {
+            xmlNode *defaults = mhi_xml_child(around, "defaults");
+            found = mhi_xml_child(mhi_xml_child(defaults, (const char *)object->name), name);
+        }
+    }
+    return found;
+}
+
+const char *mhi_xml_name(mhi_osim *o, const xmlNode *node) {
+    for (const xmlAttr *a = node->properties; a != NULL; a = a->next) {
+        if (strcmp((const char *)a->name, "name") == 0 && a->children != NULL &&
+            a->children->type == XML_TEXT_NODE) {
+            const char *copy = mhi_arena_text(&o->b.arena, (const char *)a->children->content);
+            return copy != NULL ? copy : "";
+        }
+    }
+    return "";
+}
+
+const char *mhi_xml_text(mhi_osim *o, const xmlNode *node) {
+    /* the first non-blank piece: comments may stand around a value, never inside it */
+    for (const xmlNode *c = node != NULL ? node->children : NULL; c != NULL; c = c->next) {
+        if ((c->type != XML_TEXT_NODE && c->type != XML_CDATA_SECTION_NODE) || c->content == NULL) {
+            continue;
+        }
+        const char *text = (const char *)c->content;
+        while (isspace((unsigned char)*text)) {
+            text++;
+        }
+        size_t length = strlen(text);
+        while (length > 0 && isspace((unsigned char)text[length - 1])) {
+            length--;
+        }
+        if (length > 0) {
+            const char *copy = mhi_arena_text_n(&o->b.arena, text, length);
+            return copy != NULL ? copy : "";
+        }
+    }
+    return "";
+}
+
+const char *mhi_xml_word(mhi_osim *o, xmlNode *object, const char *name) {
+    const char *text = mhi_xml_text(o, mhi_xml_property(object, name));
+    return *text != '\0' ? text : NULL;
+}
+
+double *mhi_xml_all_numbers(mhi_osim *o, const xmlNode *node, int32_t *count) {
+    const char *text = mhi_xml_text(o, node);
+    *count = 0;
+    double *numbers = MHI_TAKE(&o->b.arena, double, strlen(text) / 2 + 1);
+    while (numbers != NULL && *text != '\0') {
+        mhi_cell cell = {text, strcspn(text, " \t\r\n,()")};
+        if (cell.length == 0) {
+            text++;
+            continue;
+        }
+        if (!mhi_number(cell, &numbers[*count])) {
+            mhi_build_fail(&o->b, mhi_xml_line(node), "<%s>: '%.*s' is no finite number",
+                           (const char *)node->name, (int)cell.length, cell.text);
+            *count = 0;
+            return NULL;
+        }
+        (*count)++;
+        text += cell.length;
+    }
+    return numbers;
+}
+
+int32_t mhi_xml_numbers(mhi_osim *o, xmlNode *object, const char *name, double *out, int32_t n) {
+    xmlNode *node = mhi_xml_property(object, name);
+    int32_t count = 0;
+    if (node == NULL || *mhi_xml_text(o, node) == '\0') {
+        return 0;
+    }
+    const double *numbers = mhi_xml_all_numbers(o, node, &count);
+    if (numbers == NULL || count != n) {
+        mhi_build_fail(&o->b, mhi_xml_line(node), "<%s> holds %d numbers; it takes %d", name,
+                       (int)count, (int)n);
+        return 0;
+    }
+    memcpy(out, numbers, sizeof *out * (size_t)n);
+    return 1;
+}
+
+int32_t mhi_xml_flag(mhi_osim *o, xmlNode *object, const char *name) {
+    const char *text = mhi_xml_word(o, object, name);
+    return text != NULL && (mhi_same_word(text, "true") || strcmp(text, "1") == 0);
+}
+
+xmlNode *mhi_xml_objects(mhi_osim *o, xmlNode *parent, const char *set) {
+    xmlNode *node = mhi_xml_child(parent, set);
+    if (node != NULL && xmlHasProp(node, (const xmlChar *)"file") != NULL) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node), "<%s> kept in another file", set);
+    }
+    return mhi_xml_first(mhi_xml_child(node, "objects"));
+}
