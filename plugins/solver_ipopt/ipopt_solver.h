@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* ipopt_solver.h: shared by the files of this plugin. */
+#ifndef IPOPT_SOLVER_H
+#define IPOPT_SOLVER_H
+
+#include "compat.h"
+#include "nlp.h"
+
+struct ipopt_config { /* filled from the option table of solver_ipopt.c */
+    double tolerance;
+    int32_t max_iterations;
+    double acceptable_tolerance;
+    int32_t acceptable_iterations;
+    int32_t mu_strategy; /* position in "adaptive|monotone" */
+    double mu_init_warm;
+    double objective_scale;
+    const char *linear_solver;
+    int32_t print_level;
+    mhe_text_map options;
+};
+
+typedef struct ipopt_solver {
+    const mhe_host *host;
+    const struct ipopt_config *config;
+    nlp nlp;
+    IpoptProblem ipopt; /* for the bounds of the last solve; NULL before the first */
+    double scale;       /* of the objective; 0 before the first solve */
+    /* As Ipopt orders them: the iterate, its multipliers; then memory for whatever; [n_all] each.
+     */
+    double *v, *z_lower, *z_upper, *lambda, *work;
+
+    const mhe_solve_control *control; /* of the running solve */
+    int32_t stopped;                  /* MHE_SOLVE_DEADLINE or _INTERRUPTED once asked to; else 0 */
+    int32_t iterations;
+    double kkt_residual; /* scaled primal and dual infeasibility of the last iterate */
+} ipopt_solver;
+
+/* callbacks.c: an Ipopt problem for the current bounds of p, or NULL; user data is the
+ * ipopt_solver. `lower`, `upper` [n] are overwritten, zero [m] holds zeros. */
+IpoptProblem ipopt_problem(const nlp *p, double *lower, double *upper, double *zero);
+
+/* settings.c: makes Ipopt silent and hands it all options that stay the same between solves.
+ * MHE_E_CONFIG names an option that Ipopt does not take. */
+mhe_status ipopt_configure(IpoptProblem ipopt, const struct ipopt_config *config, double scale,
+                           mhe_error *err);
+/* Would ipopt_configure() take these? [cold] */
+mhe_status ipopt_check(const struct ipopt_config *config, mhe_error *err);
+/* Start from given multipliers, or not. */
+void ipopt_warm_start(IpoptProblem ipopt, const struct ipopt_config *config, int32_t warm);
+
+#endif
