@@ -131,14 +131,18 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
     mhe_status status = context_place(c, q, v, err);
     if (status == MHE_OK && out->mass != NULL) {
         status = context_mass(c, err);
-        memcpy(out->mass, c->mass, n_q * n_q * sizeof *out->mass);
     }
     if (status == MHE_OK && out->bias != NULL) {
         status = context_motion(c, err);
-        memcpy(out->bias, c->bias, n_q * sizeof *out->bias);
     }
     if (status != MHE_OK) {
         return status;
+    }
+    if (out->mass != NULL) {
+        memcpy(out->mass, c->mass, n_q * n_q * sizeof *out->mass);
+    }
+    if (out->bias != NULL) {
+        memcpy(out->bias, c->bias, n_q * sizeof *out->bias);
     }
     path_pose pose = {.r = c->r, .p = c->p, .slopes = c->slopes};
     if (out->length != NULL || out->length_q != NULL || out->length_qq != NULL) {

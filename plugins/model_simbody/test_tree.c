@@ -170,6 +170,22 @@ static void wrong_descriptions_are_refused(void **state) {
     make_chain(&c);
     c.bodies[2].mass = 0;
     assert_refused(&c, "coordinate 'second' moves no mass");
+    make_chain(&c);
+    c.bodies[0].body_r[8] = -1;
+    assert_refused(&c, "coordinate 'second': its joint's frame is mirrored");
+}
+
+/* As in a shoulder model of biobuddy: one frame swaps two axes, the next swaps them back. */
+static void mirrored_frames_that_cancel_are_allowed(void **state) {
+    (void)state;
+    chain c;
+    tree *t = NULL;
+    make_chain(&c);
+    c.bodies[1].joint_r[8] = -1;
+    c.bodies[1].body_r[8] = -1;
+    assert_int_equal(tree_create(&c.d, &t, NULL), MHE_OK);
+    assert_near(t->markers[0].at[2], 2, 1e-15);
+    tree_free(t);
 }
 
 int main(void) {
@@ -178,6 +194,7 @@ int main(void) {
         cmocka_unit_test(only_segments_between_links_remain),
         cmocka_unit_test(functions_and_their_derivatives),
         cmocka_unit_test(wrong_descriptions_are_refused),
+        cmocka_unit_test(mirrored_frames_that_cancel_are_allowed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

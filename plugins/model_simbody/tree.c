@@ -274,7 +274,7 @@ mhe_status tree_create(const mhe_description *description, tree **out, mhe_error
         goto fail;
     }
     tree_build(description, t, places);
-    status = tree_check_mass(t, description, err);
+    status = tree_check_joints(t, description, err);
     if (status != MHE_OK) {
         goto fail;
     }

@@ -58,7 +58,7 @@ void tree_free(tree *tree);
 /* What tree_create() checks: references, shapes and numbers of the description before it is
  * reduced; that every coordinate moves mass after. MHE_E_INPUT names the part. [cold] */
 mhe_status tree_check_description(const mhe_description *description, mhe_error *err);
-mhe_status tree_check_mass(const tree *tree, const mhe_description *description, mhe_error *err);
+mhe_status tree_check_joints(const tree *tree, const mhe_description *description, mhe_error *err);
 
 /* out [4] = f(t), f'(t), f''(t), f'''(t) */
 void function_evaluate(const mhe_function *function, double t, double *out);

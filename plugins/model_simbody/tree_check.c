@@ -14,8 +14,10 @@ static int all_finite(const double *values, int32_t n) {
     return sum == 0;
 }
 
-static int is_rotation(const double *r) {
-    double product[9], determinant[3];
+/* Columns of unit length at right angles. A mirrored frame passes: files do hold pairs of them that
+ * undo each other; what is left at the joints is checked after the reduction. */
+static int is_orthogonal(const double *r) {
+    double product[9];
     static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
     congruence3(r, unit, product);
     for (int i = 0; i < 9; i++) {
@@ -23,8 +25,7 @@ static int is_rotation(const double *r) {
             return 0;
         }
     }
-    cross3(r, r + 3, determinant);
-    return dot3(determinant, r + 6) > 0;
+    return 1;
 }
 
 static mhe_status check_motion(const mhe_motion *motion, int32_t n_coordinates, const char *body,
@@ -55,7 +56,7 @@ static mhe_status check_body(const mhe_description *d, int32_t i, mhe_error *err
         return mhe_fail(err, MHE_E_INPUT, "body '%s': its parent is not listed before it",
                         body->name);
     }
-    if (!is_rotation(body->joint_r) || !is_rotation(body->body_r) ||
+    if (!is_orthogonal(body->joint_r) || !is_orthogonal(body->body_r) ||
         !all_finite(body->joint_p, 3) || !all_finite(body->body_p, 3)) {
         return mhe_fail(err, MHE_E_INPUT,
                         "body '%s': a frame of its joint is not a rigid placement", body->name);
@@ -116,7 +117,20 @@ mhe_status tree_check_description(const mhe_description *d, mhe_error *err) {
     return MHE_OK;
 }
 
-mhe_status tree_check_mass(const tree *t, const mhe_description *d, mhe_error *err) {
+static mhe_status check_joint_frames(const tree *t, const mhe_description *d, mhe_error *err) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        const tree_joint *joint = &t->joints[i];
+        double normal[3];
+        cross3(joint->r, joint->r + 3, normal);
+        if (dot3(normal, joint->r + 6) < 0) {
+            return mhe_fail(err, MHE_E_INPUT, "coordinate '%s': its joint's frame is mirrored",
+                            d->coordinates[joint->coordinate].name);
+        }
+    }
+    return MHE_OK;
+}
+
+mhe_status tree_check_joints(const tree *t, const mhe_description *d, mhe_error *err) {
     if (t->n_q < 1) {
         return mhe_fail(err, MHE_E_INPUT, "the model has no coordinate");
     }
@@ -132,5 +146,5 @@ mhe_status tree_check_mass(const tree *t, const mhe_description *d, mhe_error *e
                             d->coordinates[c].name);
         }
     }
-    return MHE_OK;
+    return check_joint_frames(t, d, err);
 }
