@@ -28,3 +28,5 @@ function(mhe_test name)
     set_tests_properties(${name} PROPERTIES LABELS ${arg_LABEL})
     mhe_test_environment(${name})
 endfunction()
+
+include(MheConformance)
