@@ -107,7 +107,17 @@ static void texts_round_trip(void **state) {
         all[c - 1] = (char)c;
     }
     assert_text(all, NULL);
+    const char *malformed[] = {
+        "\xff",     "\x80", "\xc3", "\xc0\xaf", "\xe0\x80\x80", "\xed\xa0\x80", "\xf4\x90\x80\x80",
+        "\xe2\x82x"};
+    for (size_t i = 0; i < sizeof malformed / sizeof malformed[0]; i++) {
+        assert_int_equal(mhi_yaml_is_utf8(malformed[i]), 0);
+    }
+    assert_int_equal(mhi_yaml_is_utf8("\xc3\xa4\xe2\x82\xac\xf0\x9d\x84\x9e"), 1);
     mhi_text out = {0};
+    mhi_yaml_text("a\xff", &out);
+    assert_string_equal(out.data, "\"a\\ufffd\"");
+    mhi_text_free(&out);
     mhi_yaml_text(NULL, &out);
     assert_string_equal(out.data, "null");
     mhi_text_free(&out);

@@ -135,7 +135,7 @@ static void endless_trees_are_refused(void **state) {
     char key[400];
     memset(key, 'k', 300);
     memcpy(key + 300, ": 1", 4);
-    assert_refused(key, "f.yaml:1: a key is longer than 256 bytes");
+    assert_refused(key, "f.yaml:1: a key is longer than 160 bytes");
 }
 
 static void assert_set(mhi_tree *tree, const char *assignment) {
@@ -208,6 +208,9 @@ static void wrong_set_is_refused(void **state) {
                        "find expected ',' or ']'");
     assert_set_refused(tree, "x={a: 1, a: 2}", MHE_E_INPUT,
                        "--set x={a: 1, a: 2}: the key 'a' occurs twice");
+    assert_set_refused(tree, "a.\xff=1", MHE_E_CONFIG,
+                       "--set a.\xff=1: the path has a step that is not UTF-8 or over 160 bytes "
+                       "long");
     char deep[200] = "a";
     for (int i = 0; i < 64; i++) {
         strcat(deep, ".a");

@@ -4,6 +4,7 @@
 
 #include "base/arena.h"
 #include "config/tree_yaml.h"
+#include "config/yaml_scalar.h"
 #include "io/slurp.h"
 
 #include <stdlib.h>
@@ -163,6 +164,10 @@ static mhe_status cut_path(struct assignment *set, char *path, mhe_error *err) {
         }
         if (*step == '\0') {
             return refuse(err, set, "the path has an empty step");
+        }
+        if (strlen(step) > MHI_TREE_KEY || !mhi_yaml_is_utf8(step)) {
+            return refuse(err, set, "the path has a step that is not UTF-8 or over %d bytes long",
+                          MHI_TREE_KEY);
         }
         if (set->n_steps == MHI_TREE_DEPTH) {
             return refuse(err, set, "the path has more than %d steps", MHI_TREE_DEPTH);

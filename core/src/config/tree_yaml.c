@@ -9,7 +9,6 @@
 #include <yaml.h>
 
 #define MAX_NODES 10000
-#define MAX_KEY 256 /* bytes */
 
 struct loader {
     const char *name;
@@ -60,8 +59,8 @@ static mhe_status check_key(const struct loader *loader, const yaml_node_t *key,
         return status;
     }
     const char *text = (const char *)key->data.scalar.value;
-    if (strlen(text) > MAX_KEY) {
-        return fail(loader, line_of(key), "a key is longer than %d bytes", MAX_KEY);
+    if (strlen(text) > MHI_TREE_KEY) {
+        return fail(loader, line_of(key), "a key is longer than %d bytes", MHI_TREE_KEY);
     }
     if (strcmp(text, "<<") == 0) {
         return fail(loader, line_of(key), "merge keys ('<<') are not supported");

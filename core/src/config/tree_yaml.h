@@ -6,8 +6,8 @@
 #include "base/arena.h"
 #include "config/tree.h"
 
-/* Deepest nesting of a tree. */
-#define MHI_TREE_DEPTH 64
+#define MHI_TREE_DEPTH 64 /* deepest nesting */
+#define MHI_TREE_KEY 160  /* longest key in bytes: six times that must stay below libyaml's 1024 */
 
 /* Parses one document of UTF-8 text [length]. Nodes and their texts live in `arena`; without any
  * content *root becomes NULL. Messages start with "name:line: ". With `numbered` 0 (a text from the

@@ -69,22 +69,44 @@ static int is_plain(const char *text, size_t length) {
     return !is_reserved(text, length);
 }
 
-/* Code point at `text` and its length in bytes; a malformed byte stands for itself. */
-static uint32_t decode(const unsigned char *text, size_t length, size_t *used) {
-    size_t n = text[0] < 0xc0 ? 1 : text[0] < 0xe0 ? 2 : text[0] < 0xf0 ? 3 : 4;
+#define MALFORMED UINT32_MAX
+
+/* Code point at `text` and its length in bytes; MALFORMED is one byte long. */
+static uint32_t decode(const char *text, size_t length, size_t *used) {
+    static const uint32_t least[] = {0, 0, 0x80, 0x800, 0x10000};
+    const unsigned char *byte = (const unsigned char *)text;
+    size_t n = byte[0] < 0x80   ? 1
+               : byte[0] < 0xc2 ? 0
+               : byte[0] < 0xe0 ? 2
+               : byte[0] < 0xf0 ? 3
+               : byte[0] < 0xf5 ? 4
+                                : 0;
     *used = 1;
-    if (n == 1 || n > length) {
-        return text[0];
+    if (n < 2 || n > length) {
+        return n == 1 ? byte[0] : MALFORMED;
     }
-    uint32_t code = text[0] & (0x7fu >> n);
+    uint32_t code = byte[0] & (0x7fu >> n);
     for (size_t i = 1; i < n; i++) {
-        if ((text[i] & 0xc0) != 0x80) {
-            return text[0];
+        if ((byte[i] & 0xc0) != 0x80) {
+            return MALFORMED;
         }
-        code = code << 6 | (text[i] & 0x3fu);
+        code = code << 6 | (byte[i] & 0x3fu);
+    }
+    if (code < least[n] || code > 0x10ffff || (code >= 0xd800 && code < 0xe000)) {
+        return MALFORMED;
     }
     *used = n;
     return code;
+}
+
+int32_t mhi_yaml_is_utf8(const char *text) {
+    size_t length = strlen(text);
+    for (size_t at = 0, used = 1; at < length; at += used) {
+        if (decode(text + at, length - at, &used) == MALFORMED) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 /* What YAML forbids between quotes, folds there, or counts as a line break. */
@@ -100,9 +122,11 @@ void mhi_yaml_text_n(const char *text, size_t length, mhi_text *out) {
     }
     mhi_text_add(out, "\"");
     for (size_t at = 0, used = 1; at < length; at += used) {
-        uint32_t code = decode((const unsigned char *)text + at, length - at, &used);
+        uint32_t code = decode(text + at, length - at, &used);
         if (code == '"' || code == '\\') {
             mhi_text_add(out, "\\%c", (int)code);
+        } else if (code == MALFORMED) { /* YAML has no way to say it */
+            mhi_text_add(out, "\\ufffd");
         } else if (needs_escape(code)) {
             mhi_text_add(out, "\\u%04x", (unsigned)code);
         } else {

@@ -14,8 +14,11 @@ int32_t mhi_yaml_number(const char *text, double *value);
  * [any] */
 const char *mhi_yaml_real(double value, char out[MHI_YAML_REAL_SIZE]);
 
-/* Appends `text` (UTF-8; its first `length` bytes) on one line, in quotes and with escapes where it
- * needs them, so that it reads back the same as a text. NULL is written as null. */
+int32_t mhi_yaml_is_utf8(const char *text); /* [any] */
+
+/* Appends `text` (its first `length` bytes) on one line, in quotes and with escapes where it needs
+ * them, so that it reads back the same as a text. NULL is written as null; what is not UTF-8, as
+ * the replacement character. */
 void mhi_yaml_text(const char *text, mhi_text *out);
 void mhi_yaml_text_n(const char *text, size_t length, mhi_text *out);
 
