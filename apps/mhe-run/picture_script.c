@@ -136,10 +136,10 @@ static void add_panel(const picture *p, int32_t number, block at, int32_t height
                       mhi_text *script) {
     const picture_panel *panel = &p->panels[number];
     int32_t place = number - at.first, column = place % PER_ROW, row = place / PER_ROW;
-    double x = LEFT + column * (PANEL_X + GAP_X);
-    double y = at.top + BLOCK_TOP + row * (PANEL_Y + GAP_Y);
+    const int32_t left = LEFT + column * (PANEL_X + GAP_X);
+    const double x = left, y = at.top + BLOCK_TOP + row * (PANEL_Y + GAP_Y);
     mhi_text_add(script, "set lmargin at screen %.5f\nset rmargin at screen %.5f\n", x / WIDTH,
-                 (x + PANEL_X) / WIDTH);
+                 (double)(left + PANEL_X) / WIDTH);
     mhi_text_add(script, "set tmargin at screen %.5f\nset bmargin at screen %.5f\n", 1 - y / height,
                  1 - (y + PANEL_Y) / height);
     mhi_text_add(script, "set title ");

@@ -62,7 +62,7 @@ const char *mhi_cell_show(char out[MHI_SHOWN], mhi_cell cell) {
         unsigned char c = (unsigned char)cell.text[i];
         out[i] = c < 0x20 || c == 0x7f ? '.' : (char)c;
     }
-    (void)strcpy(out + n, n < cell.length ? "..." : "");
+    (void)snprintf(out + n, MHI_SHOWN - n, "%s", n < cell.length ? "..." : "");
     return out;
 }
 

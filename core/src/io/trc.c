@@ -23,7 +23,7 @@ static mhe_status take_unit(mhi_table_reader *reader, mhi_cell value) {
     for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
         if (mhi_cell_is(value, units[i].written)) {
             table->unit = units[i].metres;
-            (void)strcpy(table->unit_name, units[i].name);
+            (void)snprintf(table->unit_name, sizeof table->unit_name, "%s", units[i].name);
             return MHE_OK;
         }
     }
