@@ -2,8 +2,9 @@
 /* dynamics.h: inverse dynamics of the tree and its exact derivatives, in ground coordinates.
  *
  * The recursive derivatives of Carpentier & Mansard, "Analytical derivatives of rigid body dynamics
- * algorithms", RSS 2018, doi 10.15607/RSS.2018.XIV.038. Everything here is per joint; functions of
- * coordinates are the caller's. */
+ * algorithms", RSS 2018, doi 10.15607/RSS.2018.XIV.038, summed over subtrees as in Singh, Russell &
+ * Wensing, IEEE Robotics and Automation Letters 7(2), 2022. Everything here is per joint; functions
+ * of coordinates are the caller's. */
 #ifndef SIMBODY_DYNAMICS_H
 #define SIMBODY_DYNAMICS_H
 

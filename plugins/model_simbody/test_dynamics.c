@@ -60,7 +60,7 @@ static void pendulum_has_its_closed_form(void **state) {
 
 static double path_length(const mhe_description *d, int32_t muscle, const double *q) {
     const mhe_muscle *m = &d->muscles[muscle];
-    double length = 0, last[3], here[3];
+    double length = 0, last[3] = {0}, here[3];
     for (int32_t k = 0; k < m->n_points; k++) {
         test_body_point(d, m->points[k].body, q, m->points[k].location, here);
         double step[3] = {here[0] - last[0], here[1] - last[1], here[2] - last[2]};
