@@ -1,0 +1,107 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# Every kind of wrong input: exit status 2, one line that names the fault, nothing written.
+#   bad_input.sh PATH/mhe-run SOURCE_DIR
+set -u
+run=$1
+demo=$2/models/arm19
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cp "$demo"/arm19.osim "$demo"/demo* "$work"
+cd "$work" || exit 1
+failed=0
+count=0
+
+# expect NAME 'TEXT IN THE MESSAGE' [arguments of mhe-run, instead of demo.yaml]
+expect() {
+    name=$1 text=$2
+    shift 2
+    [ $# -gt 0 ] || set -- demo.yaml
+    rm -rf result
+    "$run" --out result --quiet "$@" > stdout.txt 2> stderr.txt < /dev/null
+    status=$?
+    count=$((count + 1))
+    message=$(grep -v 'warning:' stderr.txt)
+    lines=$(printf '%s\n' "$message" | grep -c .)
+    files=$(find result -type f 2>/dev/null | wc -l)
+    if [ "$status" -ne 2 ] || [ "$lines" -ne 1 ] || [ "$files" -ne 0 ]; then
+        echo "FAILED $name: status $status, $lines lines, $files files written: $message"
+        failed=$((failed + 1))
+    elif ! printf '%s' "$message" | grep -qF -- "$text"; then
+        echo "FAILED $name: '$text' is not in: $message"
+        failed=$((failed + 1))
+    fi
+    cp "$demo"/arm19.osim "$demo"/demo* .
+}
+
+# edit FILE 'SED SCRIPT'
+edit() { sed -i "$2" "$1"; }
+
+expect no-config 'nowhere.yaml' nowhere.yaml
+expect no-arguments 'config file' --set a=b
+expect unknown-option "did you mean '--quiet'" demo.yaml --quit
+expect folder-as-config 'models' "$2/models"
+
+edit demo.yaml 's/^horizon:.*/horizon: {windw: 7}/'
+expect unknown-key "did you mean 'window'"
+edit demo.yaml 's/window: 7/window: seven/'
+expect wrong-type 'demo.yaml:9'
+edit demo.yaml 's/window: 7/window: -1/'
+expect out-of-range 'window'
+edit demo.yaml 's/mhe.solver.ipopt/mhe.solver.ipot/'
+expect unknown-plugin "did you mean 'mhe.solver.ipopt'"
+edit demo.yaml 's/mhe.solver.ipopt/mhe.muscle.hill/'
+expect wrong-kind-of-plugin 'mhe.muscle.hill'
+edit demo.yaml 's/tolerance: 1e-4/tolerence: 1e-4/'
+expect plugin-option "did you mean 'tolerance'"
+expect bad-set 'window' demo.yaml --set horizon.window=0
+expect set-unknown 'horizon' demo.yaml --set horzon.window=3
+edit demo.yaml 's/q: \[0, 0, 0, 0.2\]/q: [0, 0]/'
+expect initial-size 'initial.q has 2 values'
+printf 'model: [unclosed\n' > demo.yaml
+expect not-yaml 'demo.yaml:'
+
+rm arm19.osim
+expect missing-model 'arm19.osim'
+printf '<OpenSimDocument><Model>' > arm19.osim
+expect broken-model 'arm19.osim:1'
+edit arm19.osim '0,/<mass>[0-9.]*</s//<mass>-1</'
+expect negative-mass 'mass'
+edit arm19.osim 's#<socket_parent_frame>/bodyset/humerus</socket_parent_frame>#<socket_parent_frame>/bodyset/humrus</socket_parent_frame>#'
+expect unknown-body 'humrus'
+
+rm demo_markers.trc
+expect missing-markers 'demo_markers.trc'
+edit demo_markers.trc 's/DELT/DELTT/'
+expect typing-slip "did you mean 'DELT'"
+edit demo_markers.trc '4s/[A-Za-z_]\{4,\}/&_zzzzzzzz/g;4s/Frame#_zzzzzzzz/Frame#/;4s/Time_zzzzzzzz/Time/'
+expect no-marker-matches 'no column is a marker'
+edit demo_markers.trc '3s/mm/m/'
+expect wrong-unit 'within a metre'
+edit demo_markers.trc '20s/^\([0-9]*\)\t[0-9.e-]*/\1\tnan/'
+expect nan-time 'demo_markers.trc:20'
+edit demo_markers.trc '20s/^\([0-9]*\)\t[0-9.e-]*/\1\t0/'
+expect decreasing-time 'demo_markers.trc:20'
+edit demo_markers.trc '20s/$/\t1\t2\t3\t4/'
+expect too-many-cells 'demo_markers.trc:20'
+edit demo_markers.trc '20s/\t[0-9.-]*$/\tabc/'
+expect no-number 'demo_markers.trc:20'
+edit demo_markers.trc '12,$d'
+expect too-few-frames 'too few'
+: > demo_markers.trc
+expect empty-markers 'demo_markers.trc'
+
+rm demo_emg.sto
+expect missing-emg 'demo_emg.sto'
+edit demo_emg.sto 's/TricepsLong/TricepLong/'
+expect emg-slip "did you mean 'TricepsLong'"
+edit demo_emg.sto 's/endheader/endhead/'
+expect no-endheader 'demo_emg.sto'
+head -c 4000 /dev/urandom > demo_emg.sto
+expect random-bytes 'demo_emg.sto'
+edit demo_reference.sto 's/q_/p_/g'
+expect reference-columns 'demo_reference.sto'
+expect output-is-a-file 'stdout.txt' demo.yaml --out stdout.txt/x
+
+echo "$((count - failed)) passed, $failed failed"
+[ "$failed" -eq 0 ]
