@@ -1,21 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "rig.h"
-#include "config/options.h"
-#include "config/tree.h"
+#include "use.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-
-static void count_line(const mhe_host *host, int32_t level, const char *text) {
-    (void)level, (void)text;
-    ((rig *)host->data)->logged++;
-}
-
-static const void *no_service(const mhe_host *host, const char *id) {
-    (void)host, (void)id;
-    return NULL;
-}
 
 /* All values of an iterate: x and its two multipliers, u and its two, lambda. */
 static int size_of(const toy *t) {
@@ -25,44 +14,20 @@ static int size_of(const toy *t) {
 
 mhe_status rig_open(rig *r, toy *t, const char *yaml) {
     *r = (rig){.t = t};
-    r->host =
-        (mhe_host){.size = sizeof r->host, .data = r, .log = count_line, .service = no_service};
+    const mhe_plugin *plugin = test_plugin("mhe.solver.ipopt", MHE_SOLVER_IFACE);
     r->memory = calloc((size_t)size_of(t), sizeof(double));
-    const mhe_plugin *plugin;
-    mhi_tree *tree = NULL;
-    void *config = NULL;
-    mhe_status status = mhi_registry_create(&r->host, &r->registry, &r->error);
-    if (status == MHE_OK) {
-        status = mhi_registry_find(r->registry, "mhe.solver.ipopt", MHE_SOLVER_IFACE, &plugin,
-                                   &r->error);
-    }
-    if (status == MHE_OK) {
-        status = mhi_tree_parse("test", yaml, strlen(yaml), &tree, &r->error);
-    }
-    if (status == MHE_OK) {
-        config = mhi_arena_take(&r->arena, plugin->config_size);
-        status = mhi_options_fill(plugin->options, (int32_t)plugin->option_count, tree,
-                                  mhi_tree_root(tree), NULL, 0, plugin->id, "/", &r->arena, config,
-                                  &r->error);
-    }
-    mhi_tree_free(tree);
-    if (status == MHE_OK) {
-        r->ops = plugin->ops;
-        status = r->ops->create(&r->host, &t->problem, config, &r->solver, &r->error);
-    }
-    if (r->memory == NULL) {
-        abort();
-    }
+    assert_non_null(plugin);
+    assert_non_null(r->memory);
     rig_reset(r);
-    return status;
+    r->ops = plugin->ops;
+    return r->ops->create(test_host(), &t->problem, test_config(plugin, yaml), &r->solver,
+                          &r->error);
 }
 
 void rig_close(rig *r) {
     if (r->solver != NULL) {
         r->ops->destroy(r->solver);
     }
-    mhi_registry_free(r->registry);
-    mhi_arena_free(&r->arena);
     free(r->memory);
 }
 

@@ -3,16 +3,10 @@
 #ifndef RIG_H
 #define RIG_H
 
-#include "base/arena.h"
-#include "plugin/registry.h"
 #include "toy.h"
 
 typedef struct rig {
     toy *t;
-    mhe_host host;
-    int logged; /* lines */
-    mhi_registry *registry;
-    mhi_arena arena;
     const mhe_solver_ops *ops;
     void *solver; /* NULL where create failed */
     mhe_solution at;
