@@ -1,2 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
-# Install rules: headers, core, package files.
+# Install rules: headers, core, test kit, package files. Programs and plugins are installed by their own folders.
+# All of it can be moved as a whole.
+include(CMakePackageConfigHelpers)
+
+set(MHE_CMAKE_DIR ${CMAKE_INSTALL_LIBDIR}/cmake/mhe)
+set(MHE_PC_DIR ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
+
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/include/mhe DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN *.h)
+install(FILES ${PROJECT_BINARY_DIR}/core/include/mhe/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mhe)
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
+
+# Two sets: a plugin needs headers and the conformance program alone, and none of the libraries behind the core.
+install(TARGETS mhe_plugin EXPORT mhePluginTargets)
+install(TARGETS mhe_core EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+if(TARGET mhe_testkit)
+    install(TARGETS mhe_testkit EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
+if(TARGET mhe_conformance)
+    install(TARGETS mhe_conformance EXPORT mhePluginTargets RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+install(EXPORT mhePluginTargets NAMESPACE mhe:: DESTINATION ${MHE_CMAKE_DIR})
+install(EXPORT mheTargets NAMESPACE mhe:: DESTINATION ${MHE_CMAKE_DIR})
+
+configure_package_config_file(cmake/mheConfig.cmake.in ${PROJECT_BINARY_DIR}/mheConfig.cmake INSTALL_DESTINATION ${MHE_CMAKE_DIR})
+write_basic_package_version_file(${PROJECT_BINARY_DIR}/mheConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${PROJECT_BINARY_DIR}/mheConfig.cmake ${PROJECT_BINARY_DIR}/mheConfigVersion.cmake
+        cmake/MheAddPlugin.cmake cmake/MheConformance.cmake DESTINATION ${MHE_CMAKE_DIR})
+
+file(RELATIVE_PATH MHE_PREFIX_FROM_PC ${CMAKE_INSTALL_PREFIX}/${MHE_PC_DIR} ${CMAKE_INSTALL_PREFIX})
+string(REGEX REPLACE "/$" "" MHE_PREFIX_FROM_PC ${MHE_PREFIX_FROM_PC})
+foreach(package IN ITEMS mhe mhe-plugin)
+    configure_file(cmake/${package}.pc.in ${PROJECT_BINARY_DIR}/${package}.pc @ONLY)
+    install(FILES ${PROJECT_BINARY_DIR}/${package}.pc DESTINATION ${MHE_PC_DIR})
+endforeach()

@@ -1,0 +1,106 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# Installs into a folder, moves that elsewhere, and works with it as a stranger would: a cost plugin and an application
+# built with find_package, the same plugin with pkg-config alone; listed, described, checked, run.
+# usage: test_install.sh CMAKE CC SOURCE_DIR BUILD_DIR LIBDIR SANITIZERS
+set -eu
+cmake=$1 cc=$2 source=$3 build=$4 libdir=$5 sanitizers=$6
+here=$source/tests/install
+work=$build/tests/install_package
+prefix=$work/moved
+id=org.example.cost.effort
+export CMAKE_BUILD_PARALLEL_LEVEL=2
+
+give_up() {
+    printf 'FAILED: %s\n' "$*" >&2
+    exit 1
+}
+
+# expect TEXT FILE
+expect() {
+    grep -qF -- "$1" "$2" || { cat "$2"; give_up "'$1' is not in $2"; }
+}
+
+# build_project NAME: into work/NAME against the installation; its programs are instrumented as the core is
+build_project() {
+    {
+        "$cmake" -S "$here/$1" -B "$work/$1" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$prefix" \
+            -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_FLAGS="-Wall -Wextra -Wpedantic -Werror" \
+            -DCMAKE_EXE_LINKER_FLAGS="${sanitizers:+-fsanitize=$sanitizers}"
+        "$cmake" --build "$work/$1"
+    } >"$work/$1.log" 2>&1 || give_up "$1 is not built; see $work/$1.log"
+}
+
+install_and_move() {
+    rm -rf "$work"
+    mkdir -p "$work"
+    "$cmake" --install "$build" --prefix "$work/first" >"$work/install.log"
+    mv "$work/first" "$prefix"
+    if grep -rlF "$source" "$prefix/$libdir/cmake" "$prefix/$libdir/pkgconfig" "$prefix/include"; then
+        give_up "these installed files name the source tree"
+    fi
+    if grep -l mhe_flags "$prefix/$libdir"/cmake/mhe/*Targets*.cmake; then
+        give_up "the build's own flags leak into the package"
+    fi
+}
+
+plugin_by_pkg_config() {
+    mkdir -p "$work/by_pkg_config"
+    # Unquoted: flags are words.
+    # shellcheck disable=SC2046
+    "$cc" -std=c11 -O2 -fPIC -shared -fvisibility=hidden -Wl,-z,defs $(pkg-config --cflags mhe-plugin) \
+        "$here/external_cost/cost_effort.c" -o "$work/by_pkg_config/cost_effort.so"
+    symbols=$(nm -D --defined-only "$work/by_pkg_config/cost_effort.so" | awk '{print $3}')
+    [ "$symbols" = mhe_plugin_entry ] || give_up "the plugin exports: $symbols"
+    plugins=$(pkg-config --variable=plugindir mhe-plugin)
+    [ "$(cd "$plugins" && pwd)" = "$prefix/$libdir/mhe/plugins/abi0" ] || give_up "plugindir is $plugins"
+    "$prefix/bin/mhe-conformance" "$work/by_pkg_config/cost_effort.so"
+}
+
+application_by_pkg_config() {
+    # shellcheck disable=SC2046
+    "$cc" -std=c11 ${sanitizers:+-fsanitize=$sanitizers} "$here/external_app/embed.c" $(pkg-config --cflags --libs mhe) \
+        -o "$work/embed_by_pkg_config"
+    "$work/embed_by_pkg_config" "$source/models/arm19/demo.yaml" >"$work/embed.txt"
+    expect "4 coordinates, 19 muscles" "$work/embed.txt"
+}
+
+run_with_plugin() {
+    run=$prefix/bin/mhe-run
+    "$run" --list-plugins >"$work/list.txt"
+    expect "$id" "$work/list.txt"
+    expect mhe.solver.ipopt "$work/list.txt"
+    "$run" --list-plugins --json >"$work/list.json"
+    expect "\"$prefix/" "$work/list.json" # the installed plugins, found from the program
+    for format in "" --json --markdown; do
+        # shellcheck disable=SC2086
+        "$run" --describe "$id" $format >"$work/describe.txt"
+        expect "Activation that costs nothing." "$work/describe.txt"
+    done
+    # The first 0.6 s of the demo, with the new cost beside the usual one.
+    demo=$source/models/arm19
+    head -n 66 "$demo/demo_markers.trc" >"$work/markers.trc"
+    head -n 67 "$demo/demo_emg.sto" >"$work/emg.sto"
+    costs="costs=[{plugin: mhe.cost.emg-markers-high}, {plugin: $id, rest: 0.01, weight: 0.1}]"
+    "$run" "$demo/demo.yaml" --quiet --out "$work/out" --set "data.markers=$work/markers.trc" \
+        --set "data.emg=$work/emg.sto" --set "$costs" >"$work/run.txt" 2>&1 || { cat "$work/run.txt"; give_up "no run"; }
+    expect "$id" "$work/out/config.yaml"
+    expect '"converged"' "$work/out/summary.json"
+    if "$run" --check "$demo/demo.yaml" --set "costs=[{plugin: $id, rest: 2}]" >"$work/check.txt" 2>&1; then
+        give_up "rest = 2 is out of range, yet accepted"
+    fi
+    expect rest "$work/check.txt"
+}
+
+install_and_move
+build_project external_cost
+(cd "$work/external_cost" && ctest --output-on-failure) >"$work/ctest.log" || { cat "$work/ctest.log"; give_up ctest; }
+export MHE_PLUGIN_PATH="$work/external_cost"
+build_project external_app
+"$work/external_app/embed" "$source/models/arm19/demo.yaml" >"$work/embed.txt" || give_up embed
+expect "4 coordinates, 19 muscles" "$work/embed.txt"
+export PKG_CONFIG_PATH="$prefix/$libdir/pkgconfig"
+plugin_by_pkg_config
+application_by_pkg_config
+run_with_plugin
+echo "installed package: all as it should be"
