@@ -13,8 +13,9 @@ static uint64_t allocations(void *data) {
     (void)data;
     return mhi_allocations();
 }
+#define COUNTER allocations
 #else
-#define allocations NULL
+#define COUNTER NULL
 #endif
 
 typedef struct found {
@@ -40,8 +41,7 @@ static void collect(void *data, int32_t outcome, const char *plugin, const char 
 
 static found run(const char *name, const char *check) {
     found f = {.check = check};
-    mhe_testkit kit = {
-        .size = sizeof kit, .data = &f, .report = collect, .allocations = allocations};
+    mhe_testkit kit = {.size = sizeof kit, .data = &f, .report = collect, .allocations = COUNTER};
     char file[4096];
     (void)snprintf(file, sizeof file, "%s/%s.so", PLUGIN_DIR, name);
     assert_int_equal(mhe_testkit_run(&kit, file, NULL), MHE_OK);
