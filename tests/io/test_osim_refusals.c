@@ -1,0 +1,235 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* .osim reader: mistakes with their lines, things that cannot be said by name; files by content. */
+#include "io/model_file.h"
+#include "support.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#define DOCUMENT(content)                                                  \
+    "<OpenSimDocument Version=\"40000\">\n<Model name=\"test\">\n" content \
+    "</Model></OpenSimDocument>\n"
+#define SET(name, content) "<" name "><objects>\n" content "</objects></" name ">\n"
+/* lines 3 to 11 of a document: body in 4 to 7, joint in 10; objects that follow begin in line 13 */
+#define ARM_WITH(body, joint)                                                                 \
+    SET("BodySet", "<Body name=\"arm\">\n<mass>1</mass>\n" body "</Body>\n")                  \
+    SET("JointSet", "<PinJoint name=\"j\"><socket_parent_frame>/ground</socket_parent_frame>" \
+                    "<socket_child_frame>/bodyset/arm</socket_child_frame>" joint "</PinJoint>\n")
+#define ARM ARM_WITH("<!-- -->\n", "")
+#define POINTS                                                                             \
+    "<PathPoint name=\"p\"><socket_parent_frame>/ground</socket_parent_frame></PathPoint>" \
+    "<PathPoint name=\"q\"><socket_parent_frame>/bodyset/arm</socket_parent_frame></PathPoint>"
+#define MUSCLE_WITH(type, points, path, extra)                              \
+    "<" type " name=\"m\">\n<GeometryPath><PathPointSet><objects>\n" points \
+    "</objects></PathPointSet>" path "</GeometryPath>\n"                    \
+    "<optimal_fiber_length>0.1</optimal_fiber_length>"                      \
+    "<tendon_slack_length>0.2</tendon_slack_length>" extra "</" type ">\n"
+#define MUSCLE(extra) MUSCLE_WITH("Thelen2003Muscle", POINTS, "", extra)
+#define F100 "<max_isometric_force>100</max_isometric_force>"
+#define MARKER(frame, at)                                                                      \
+    SET("MarkerSet", "<Marker name=\"M\"><socket_parent_frame>" frame "</socket_parent_frame>" \
+                     "<location>" at "</location></Marker>\n")
+#define AXIS(content)                                                                             \
+    DOCUMENT(SET("BodySet", "<Body name=\"b\"/>\n")                                               \
+                 SET("JointSet", "<CustomJoint name=\"j\">"                                       \
+                                 "<socket_parent_frame>/ground</socket_parent_frame>"             \
+                                 "<socket_child_frame>b</socket_child_frame><coordinates>"        \
+                                 "<Coordinate name=\"q\"/><Coordinate name=\"r\"/></coordinates>" \
+                                 "<SpatialTransform>\n<TransformAxis name=\"rotation1\">" content \
+                                 "</TransformAxis></SpatialTransform></CustomJoint>\n"))
+
+static void mistakes_are_named_with_their_line(void **state) {
+    (void)state;
+    const struct {
+        const char *text, *message;
+    } cases[] = {
+        {"<OpenSimDocument>\n<Model>\n</Modl></OpenSimDocument>",
+         "m:3: Opening and ending tag mismatch: Model line 2 and Modl"},
+        {"", "m:1: Document is empty"},
+        {"<VTKFile/>", "m:1: not an OpenSim model: the outermost element is <VTKFile>, not "
+                       "<OpenSimDocument>"},
+        {"<OpenSimDocument/>", "m:1: <OpenSimDocument> holds no <Model>"},
+        {"<!DOCTYPE a [<!ENTITY b \"c\">]>\n" DOCUMENT(ARM),
+         "m: a document type declaration has no place in a model file"},
+        {DOCUMENT(SET("BodySet", "<Body name=\"arm\"><mass>-2</mass></Body>\n")),
+         "m:4: body 'arm' has a negative mass (-2 kg)"},
+        {DOCUMENT(SET("BodySet", "<Body name=\"arm\">\n<mass>heavy</mass></Body>\n")),
+         "m:5: <mass>: 'heavy' is no finite number"},
+        {DOCUMENT(SET("BodySet", "<Body name=\"arm\">\n<mass>nan</mass></Body>\n")),
+         "m:5: <mass>: 'nan' is no finite number"},
+        {DOCUMENT(ARM_WITH("<mass_center>1 2</mass_center>\n", "")),
+         "m:6: <mass_center> holds 2 numbers; it takes 3"},
+        {DOCUMENT(ARM_WITH("<inertia>1 1 -1 0 0 0</inertia>\n", "")),
+         "m:4: the inertia of body 'arm' is not positive"},
+        {DOCUMENT(ARM_WITH("\n", "<coordinates><Coordinate name=\"q\"><range>1 0</range>"
+                                 "</Coordinate></coordinates>")),
+         "m:10: the range of coordinate 'q' ends (0) before it begins (1)"},
+        {DOCUMENT(SET("BodySet", "<Body name=\"b\"/>\n<Body name=\"b\"/>\n")),
+         "m:5: body 'b' is there twice (first in line 4)"},
+        {DOCUMENT(ARM MARKER("/bodyset/Arn", "0 0 0")),
+         "m:13: '/bodyset/Arn' is no body or frame (did you mean 'arm'?)"},
+        {DOCUMENT(ARM MARKER("/bodyset/arm", "0 0")),
+         "m:13: <location> holds 2 numbers; it takes 3"},
+        {DOCUMENT(ARM SET("ForceSet", MUSCLE("<max_isometric_force>-1</max_isometric_force>"))),
+         "m:13: muscle 'm': the maximal isometric force cannot be -1"},
+        {DOCUMENT(ARM SET("ForceSet", MUSCLE_WITH("Thelen2003Muscle", "", "", F100))),
+         "m:13: muscle 'm' has 0 path points; it needs at least 2"},
+        {DOCUMENT(ARM SET("ForceSet", "<Thelen2003Muscle name=\"m\"/>\n")),
+         "m:13: muscle 'm' has no GeometryPath"},
+        {DOCUMENT(ARM SET("ForceSet", MUSCLE(F100) MUSCLE(F100))),
+         "m:17: muscle 'm' is there twice (first in line 13)"},
+        {DOCUMENT(
+             ARM SET("ForceSet", MUSCLE_WITH("Thelen2003Muscle",
+                                             "<PathPoint><body>leg</body></PathPoint>", "", F100))),
+         "m:15: 'leg' is no body or frame (valid: arm, ground)"},
+        {AXIS("<coordinates>q</coordinates><axis>0 0 0</axis>"),
+         "m:8: the axis of a motion of 'b' has no length"},
+        {AXIS("<coordinates>s</coordinates><axis>1 0 0</axis>"),
+         "m:8: joint 'j' has no coordinate 's'"},
+        {AXIS("<coordinates>q</coordinates><axis>1 0 0</axis><SimmSpline><x>0 1 1</x><y>0 1 2</y>"
+              "</SimmSpline>"),
+         "m:8: <SimmSpline> of rotation1 of joint 'j': x does not increase at 1"},
+        {AXIS("<coordinates>q</coordinates><axis>1 0 0</axis><SimmSpline><x>0 1</x><y>0</y>"
+              "</SimmSpline>"),
+         "m:8: <SimmSpline> of rotation1 of joint 'j' needs as many x as y, at least 2 (has 2 and "
+         "1)"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        mhe_description *d = NULL;
+        mhe_error err = {0};
+        mhe_status status = mhi_osim_parse("m", cases[i].text, strlen(cases[i].text), &d, &err);
+        assert_string_equal(err.text, cases[i].message);
+        assert_int_equal(status, MHE_E_INPUT);
+        assert_null(d);
+    }
+}
+
+static void frames_and_bodies_in_a_circle(void **state) {
+    (void)state;
+    const char *frames = DOCUMENT(
+        ARM MARKER("f", "0 0 0") "<components><PhysicalOffsetFrame name=\"f\"><socket_parent>/g"
+                                 "</socket_parent></PhysicalOffsetFrame><PhysicalOffsetFrame "
+                                 "name=\"g\"><socket_parent>/f</socket_parent>"
+                                 "</PhysicalOffsetFrame></components>\n");
+    const char *bodies = DOCUMENT(SET("BodySet", "<Body name=\"a\"/>\n<Body name=\"b\"/>\n")
+                                      SET("JointSet", "<WeldJoint name=\"i\">"
+                                                      "<socket_parent_frame>a</socket_parent_frame>"
+                                                      "<socket_child_frame>b</socket_child_frame>"
+                                                      "</WeldJoint><WeldJoint name=\"j\">"
+                                                      "<socket_parent_frame>b</socket_parent_frame>"
+                                                      "<socket_child_frame>a</socket_child_frame>"
+                                                      "</WeldJoint>"));
+    mhe_description *d = NULL;
+    mhe_error err = {0};
+    assert_int_equal(mhi_osim_parse("m", frames, strlen(frames), &d, &err), MHE_E_INPUT);
+    assert_string_equal(err.text, "m:15: frame '/f' is fixed to itself");
+    assert_int_equal(mhi_osim_parse("m", bodies, strlen(bodies), &d, &err), MHE_E_INPUT);
+    assert_string_equal(err.text, "m:4: body 'a' is its own ancestor");
+}
+
+/* Each document holds one thing that a description cannot carry. */
+static void unsupported_things_are_named(void **state) {
+    (void)state;
+    const struct {
+        const char *text, *unsupported;
+    } cases[] = {
+        {DOCUMENT(ARM SET("ConstraintSet", "<CoordinateCouplerConstraint name=\"c\"/>\n")),
+         "m:13: CoordinateCouplerConstraint 'c'"},
+        {DOCUMENT(ARM SET("ControllerSet", "<PrescribedController name=\"c\"/>\n")),
+         "m:13: PrescribedController 'c'"},
+        {DOCUMENT(ARM SET("ForceSet", "<CoordinateLimitForce name=\"l\"/>\n")),
+         "m:13: CoordinateLimitForce 'l'"},
+        {DOCUMENT(ARM SET("ForceSet", MUSCLE_WITH("Thelen2003Muscle",
+                                                  POINTS "\n<ConditionalPathPoint "
+                                                         "name=\"c\"/>",
+                                                  "", F100))),
+         "m:16: ConditionalPathPoint 'c' of muscle 'm'"},
+        {DOCUMENT(
+             ARM SET("ForceSet", MUSCLE_WITH("Thelen2003Muscle", POINTS,
+                                             "<PathWrapSet><objects><PathWrap><wrap_object>elbow"
+                                             "</wrap_object></PathWrap></objects></PathWrapSet>",
+                                             F100))),
+         "m:15: PathWrap of muscle 'm' around 'elbow'"},
+        {DOCUMENT(
+             ARM SET("ForceSet", MUSCLE_WITH("Schutte1993Muscle_Deprecated", POINTS, "", F100))),
+         "m:13: the curves of Schutte1993Muscle_Deprecated 'm'"},
+        {DOCUMENT(ARM_WITH("\n", "<coordinates><Coordinate name=\"q\"><prescribed>true</prescribed>"
+                                 "</Coordinate></coordinates>")),
+         "m:10: prescribed motion of coordinate 'q'"},
+        {DOCUMENT(SET("BodySet", "<Body name=\"b\"/>\n")),
+         "m:4: body 'b' without a joint (held by ground)"},
+        {DOCUMENT(SET("BodySet", "<Body name=\"b\"/>\n")
+                      SET("JointSet", "<EllipsoidJoint name=\"e\"><socket_parent_frame>ground"
+                                      "</socket_parent_frame><socket_child_frame>b"
+                                      "</socket_child_frame></EllipsoidJoint>\n")),
+         "m:7: EllipsoidJoint 'e' (held rigid)"},
+        {AXIS("<coordinates>q r</coordinates><axis>1 0 0</axis>"),
+         "m:8: rotation1 of joint 'j' depends on several coordinates (q r)"},
+        {AXIS("<coordinates>q</coordinates><axis>1 0 0</axis><GCVSpline/>"),
+         "m:8: function <GCVSpline> of rotation1 of joint 'j'"},
+        {DOCUMENT(ARM "<SmoothSphere/>\n"), "m:12: element <SmoothSphere>"},
+        {DOCUMENT(ARM "<ForceSet file=\"f.xml\"/>\n"), "m:12: <ForceSet> kept in another file"},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        mhe_description *d = NULL;
+        mhe_error err = {0};
+        if (mhi_osim_parse("m", cases[i].text, strlen(cases[i].text), &d, &err) != MHE_OK) {
+            fail_msg("%s", err.text);
+        }
+        assert_int_equal(d->n_unsupported, 1);
+        assert_string_equal(d->unsupported[0], cases[i].unsupported);
+        mhi_description_free(d);
+    }
+}
+
+static void what_does_nothing_is_not_listed(void **state) {
+    (void)state;
+    const char *text = DOCUMENT("<credits>x</credits>" ARM_WITH(
+        "<WrapObjectSet><objects><WrapCylinder name=\"w\"/>"
+        "</objects></WrapObjectSet>\n",
+        "") SET("ConstraintSet", "<WeldConstraint name=\"c\"><isEnforced>false</isEnforced>"
+                                 "</WeldConstraint>\n")
+                                    SET("ContactGeometrySet", "<ContactSphere name=\"s\"/>\n"));
+    mhe_description *d = NULL;
+    mhe_error err = {0};
+    assert_int_equal(mhi_osim_parse("m", text, strlen(text), &d, &err), MHE_OK);
+    assert_int_equal(d->n_unsupported + d->n_warnings, 0);
+    mhi_description_free(d);
+}
+
+static void files_are_told_apart_by_content(void **state) {
+    (void)state;
+    const struct {
+        const char *name, *text;
+        int ok;
+    } files[] = {
+        {"model_xml.bioMod", "\xef\xbb\xbf <OpenSimDocument><Model/></OpenSimDocument>", 1},
+        {"model_text.osim", "version 3\nsegment A\nendsegment\n", 1},
+        {"model_empty.osim", "", 0}};
+    char path[1024];
+    mhe_description *d = NULL;
+    mhe_error err = {0};
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        (void)snprintf(path, sizeof path, "%s/tests/%s", MHE_TEST_BINARY_DIR, files[i].name);
+        FILE *stream = fopen(path, "wb");
+        assert_non_null(stream);
+        (void)fputs(files[i].text, stream);
+        (void)fclose(stream);
+        mhe_status status = mhi_model_read(path, &d, &err);
+        assert_int_equal(status, files[i].ok ? MHE_OK : MHE_E_INPUT);
+        mhi_description_free(d);
+        (void)remove(path);
+    }
+    assert_int_equal(mhi_model_read("/nowhere/arm.osim", &d, &err), MHE_E_INPUT);
+    assert_null(d);
+    assert_non_null(strstr(err.text, "/nowhere/arm.osim"));
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(mistakes_are_named_with_their_line),
+                                       cmocka_unit_test(frames_and_bodies_in_a_circle),
+                                       cmocka_unit_test(unsupported_things_are_named),
+                                       cmocka_unit_test(what_does_nothing_is_not_listed),
+                                       cmocka_unit_test(files_are_told_apart_by_content)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
