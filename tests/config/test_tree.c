@@ -127,11 +127,19 @@ static void endless_trees_are_refused(void **state) {
         strcat(text, line);
     }
     assert_refused(text, "f.yaml:1: more than 10000 values, aliases expanded");
-    char deep[400];
-    memset(deep, '[', 200);
-    memset(deep + 200, ']', 200);
-    assert_refused_n(deep, sizeof deep,
+    const size_t megabyte = 1 << 20; /* refused without reading it all */
+    char *deep = malloc(megabyte);
+    assert_non_null(deep);
+    memset(deep, '[', megabyte);
+    assert_refused_n(deep, megabyte,
                      "f.yaml:1: nested deeper than 64 levels, or an alias inside its own anchor");
+    memset(deep, ',', megabyte);
+    for (size_t i = 0; i + 1 < megabyte; i += 2) {
+        deep[i] = i == 0 ? '[' : '1';
+    }
+    deep[1] = ' ';
+    assert_refused_n(deep, megabyte, "f.yaml:1: more than 10000 values, aliases expanded");
+    free(deep);
     char key[400];
     memset(key, 'k', 300);
     memcpy(key + 300, ": 1", 4);

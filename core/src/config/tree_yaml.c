@@ -37,6 +37,15 @@ static mhe_status no_memory(const struct loader *loader) {
     return mhe_fail(loader->err, MHE_E_MEMORY, "%s: out of memory", loader->name);
 }
 
+static mhe_status too_deep(const struct loader *loader, size_t line) {
+    return fail(loader, line, "nested deeper than %d levels, or an alias inside its own anchor",
+                MHI_TREE_DEPTH);
+}
+
+static mhe_status too_many(const struct loader *loader, size_t line) {
+    return fail(loader, line, "more than %d values, aliases expanded", MAX_NODES);
+}
+
 static size_t line_of(const yaml_node_t *node) {
     return node->start_mark.line + 1;
 }
@@ -128,12 +137,10 @@ static mhe_status convert_scalar(struct loader *loader, const yaml_node_t *sourc
 static mhe_status convert(struct loader *loader, int id, int depth, mhi_node **out) {
     const yaml_node_t *source = yaml_document_get_node(&loader->document, id);
     if (depth > MHI_TREE_DEPTH) {
-        return fail(loader, line_of(source),
-                    "nested deeper than %d levels, or an alias inside its own anchor",
-                    MHI_TREE_DEPTH);
+        return too_deep(loader, line_of(source));
     }
     if (++loader->n_nodes > MAX_NODES) {
-        return fail(loader, line_of(source), "more than %d values, aliases expanded", MAX_NODES);
+        return too_many(loader, line_of(source));
     }
     const char *standard = source->type == YAML_SCALAR_NODE     ? YAML_DEFAULT_SCALAR_TAG
                            : source->type == YAML_SEQUENCE_NODE ? YAML_DEFAULT_SEQUENCE_TAG
@@ -201,6 +208,47 @@ static mhe_status parser_error(const struct loader *loader, const yaml_parser_t 
                 from, problem);
 }
 
+static mhe_status start_parser(const struct loader *loader, yaml_parser_t *parser, const char *text,
+                               size_t length) {
+    if (!yaml_parser_initialize(parser)) {
+        return no_memory(loader);
+    }
+    yaml_parser_set_encoding(parser, YAML_UTF8_ENCODING);
+    yaml_parser_set_input_string(parser, (const unsigned char *)text, length);
+    return MHE_OK;
+}
+
+/* A pass over the events alone. libyaml's own loader takes a minute for a megabyte of '['. */
+static mhe_status check_size(const struct loader *loader, const char *text, size_t length) {
+    yaml_parser_t parser;
+    mhe_status status = start_parser(loader, &parser, text, length);
+    if (status != MHE_OK) {
+        return status;
+    }
+    int depth = 0, n = 0, more = 1;
+    while (more && status == MHE_OK) {
+        yaml_event_t event;
+        if (!yaml_parser_parse(&parser, &event)) {
+            status = parser_error(loader, &parser, text, length);
+            break;
+        }
+        int start =
+            event.type == YAML_SEQUENCE_START_EVENT || event.type == YAML_MAPPING_START_EVENT;
+        int end = event.type == YAML_SEQUENCE_END_EVENT || event.type == YAML_MAPPING_END_EVENT;
+        depth += start - end;
+        n += start || event.type == YAML_SCALAR_EVENT;
+        more = event.type != YAML_STREAM_END_EVENT;
+        if (depth > MHI_TREE_DEPTH) {
+            status = too_deep(loader, event.start_mark.line + 1);
+        } else if (n > 2 * MAX_NODES) { /* keys are scalars here */
+            status = too_many(loader, event.start_mark.line + 1);
+        }
+        yaml_event_delete(&event);
+    }
+    yaml_parser_delete(&parser);
+    return status;
+}
+
 /* There is one document; what follows it is checked and refused. */
 static mhe_status check_end(const struct loader *loader, yaml_parser_t *parser, const char *text,
                             size_t length) {
@@ -220,12 +268,13 @@ mhe_status mhi_yaml_parse(const char *name, const char *text, size_t length, int
     struct loader loader = {.name = name, .numbered = numbered, .arena = arena, .err = err};
     yaml_parser_t parser;
     *root = NULL;
-    if (!yaml_parser_initialize(&parser)) {
-        return no_memory(&loader);
+    mhe_status status = check_size(&loader, text, length);
+    if (status == MHE_OK) {
+        status = start_parser(&loader, &parser, text, length);
     }
-    yaml_parser_set_encoding(&parser, YAML_UTF8_ENCODING);
-    yaml_parser_set_input_string(&parser, (const unsigned char *)text, length);
-    mhe_status status = MHE_OK;
+    if (status != MHE_OK) {
+        return status;
+    }
     if (!yaml_parser_load(&parser, &loader.document)) {
         status = parser_error(&loader, &parser, text, length);
     } else {
