@@ -95,6 +95,8 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
                   {&e->solution.zu_upper, e->n * e->n_u},
                   {&e->guess_x, nodes * e->n_x},
                   {&e->guess_u, e->n * e->n_u},
+                  {&e->prior_centre, e->n_x},
+                  {&e->prior_weight, e->n_x},
                   {&e->start_q, e->n_q},
                   {&e->start_v, e->n_q},
                   {&e->no_markers, 3 * e->n_k},
@@ -112,9 +114,6 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
         if (*wanted[i].array == NULL) {
             return mhe_fail(err, MHE_E_MEMORY, "out of memory");
         }
-    }
-    for (int32_t i = 0; i < (e->delay + 1) * e->n_m; i++) {
-        e->delay_line[i] = NAN;
     }
     for (int32_t i = 0; i < 3 * e->n_k; i++) {
         e->no_markers[i] = NAN;
@@ -266,11 +265,15 @@ void mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *info) {
                                  .config_name = e->run->name};
 }
 
-/* The EMG that a node at this frame tracks: that of `delay` frames ago. */
+/* The EMG that a node at this frame tracks: that of `delay` frames ago, before that the first. */
 static const double *delayed_emg(mhe_estimator *e, const double *emg) {
     const int32_t slots = e->delay + 1;
     const int32_t put = (int32_t)(e->n_frames % slots), get = (int32_t)((e->n_frames + 1) % slots);
-    memcpy(e->delay_line + put * e->n_m, emg, sizeof(double) * (size_t)e->n_m);
+    for (int32_t slot = 0; slot < slots; slot++) {
+        if (slot == put || e->n_frames == 0) {
+            memcpy(e->delay_line + slot * e->n_m, emg, sizeof(double) * (size_t)e->n_m);
+        }
+    }
     return e->delay_line + get * e->n_m;
 }
 

@@ -36,8 +36,9 @@ struct mhe_estimator {
 
     int32_t solved; /* windows so far */
     mhe_solution solution;
-    double *guess_x, *guess_u; /* what the last solve started from */
-    double *start_q, *start_v; /* known first state, NaN where free */
+    double *guess_x, *guess_u;           /* what the last solve started from */
+    double *prior_centre, *prior_weight; /* [n_x], of the first window's proximal term */
+    double *start_q, *start_v;           /* known first state, NaN where free */
     int32_t start_known;
 
     double *no_markers, *no_emg; /* all missing */

@@ -6,8 +6,10 @@
 #include <math.h>
 #include <string.h>
 
-#define FIRST_SOLVES \
-    10 /* the first window starts cold: it may take several times the iteration limit */
+/* The first window, see solve_first(). */
+#define FIRST_SOLVES 10    /* at most */
+#define FIRST_WEIGHT 100.0 /* of the proximal term on velocities and activations */
+#define FIRST_MOVE 0.02    /* 1, rad/s: so near to its centre the term no longer matters */
 
 static void *row(double *array, int32_t k, int32_t width) {
     return array + (ptrdiff_t)k * width;
@@ -185,20 +187,55 @@ static void predict(mhe_estimator *e) {
     e->solution.has_multipliers = 0;
 }
 
-mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
-                            mhe_error *err) {
-    const int32_t tries = e->solved == 0 ? FIRST_SOLVES : 1;
+static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
+    *info = (mhe_solve_info){.size = sizeof *info};
+    return e->solver->solve(e->solver_self, NULL, &e->solution, info, err);
+}
+
+/* Largest change of a velocity or activation of the first state. */
+static double first_state_move(const mhe_estimator *e, const double *before) {
+    double move = 0;
+    for (int32_t i = e->n_q; i < e->n_x; i++) {
+        move = fmax(move, fabs(e->solution.x[i] - before[i]));
+    }
+    return move;
+}
+
+/* With its first state free the window hardly determines the first activations: full Gauss-Newton
+ * steps then run to and fro. A proximal term, whose centre follows the solution until both agree,
+ * makes each solve well posed and vanishes from the last (proximal point method: Rockafellar 1976,
+ * doi:10.1137/0314056). */
+static mhe_status solve_first(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
+    double *weight = e->prior_weight, *centre = e->prior_centre;
     mhe_status status = MHE_OK;
     int32_t iterations = 0;
-    for (int32_t i = 0; i < tries && status == MHE_OK; i++) {
-        *info = (mhe_solve_info){.size = sizeof *info};
-        status = e->solver->solve(e->solver_self, NULL, &e->solution, info, err);
+    for (int32_t i = e->n_q; i < e->n_x; i++) {
+        weight[i] = FIRST_WEIGHT;
+    }
+    for (int32_t round = 0; round < FIRST_SOLVES && status == MHE_OK; round++) {
+        memcpy(centre, e->solution.x, sizeof(double) * (size_t)e->n_x);
+        mhi_ocp_set_prior(e->ocp, centre, weight);
+        status = solve_once(e, info, err);
         iterations += info->iterations;
-        if (info->outcome != MHE_SOLVE_ITERATION_LIMIT) {
-            break;
+        if (status == MHE_OK && info->outcome == MHE_SOLVE_CONVERGED) {
+            if (first_state_move(e, centre) < FIRST_MOVE) {
+                break;
+            }
+        } else {
+            for (int32_t i = e->n_q; i < e->n_x; i++) {
+                weight[i] *= 10;
+            }
         }
     }
+    memset(weight, 0, sizeof(double) * (size_t)e->n_x);
+    mhi_ocp_set_prior(e->ocp, centre, weight);
     info->iterations = iterations;
+    return status;
+}
+
+mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
+                            mhe_error *err) {
+    const mhe_status status = (e->solved == 0 ? solve_first : solve_once)(e, info, err);
     const int usable = status == MHE_OK &&
                        all_finite(e->solution.x, (ptrdiff_t)(e->n + 1) * e->n_x) &&
                        all_finite(e->solution.u, (ptrdiff_t)e->n * e->n_u);

@@ -26,8 +26,9 @@ struct mhi_ocp {
     uint32_t wanted; /* signals any term reads */
     double interval;
     double *x_lower, *x_upper, *u_lower, *u_upper;
-    double *targets; /* [(N+1) x n_y] */
-    double *times;   /* [N+1] */
+    double *targets;                     /* [(N+1) x n_y] */
+    double *times;                       /* [N+1] */
+    double *prior_centre, *prior_weight; /* [n_x] */
     worker *workers;
     mhi_arena arena;
 };
@@ -80,6 +81,17 @@ static void spread(const worker *w, int32_t n_x, int32_t n_u, const mhe_stage_va
     }
 }
 
+static void add_prior(const mhi_ocp *ocp, const double *x, int32_t n_z, mhi_term_sum *sum) {
+    for (int32_t i = 0; i < ocp->face.n_x; i++) {
+        const double weight = ocp->prior_weight[i], difference = x[i] - ocp->prior_centre[i];
+        sum->cost += 0.5 * weight * difference * difference;
+        if (sum->gradient != NULL) {
+            sum->gradient[i] += weight * difference;
+            sum->hessian[i * n_z + i] += weight;
+        }
+    }
+}
+
 static mhe_status evaluate_cost(const mhi_ocp *ocp, worker *w, int32_t k, const double *x,
                                 const double *u, const mhe_stage_values *out, mhe_error *err) {
     const int derivatives = out->hess_xx != NULL;
@@ -108,6 +120,9 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, worker *w, int32_t k, const 
     }
     if (status != MHE_OK) {
         return status;
+    }
+    if (k == 0) {
+        add_prior(ocp, x, n_z, &sum);
     }
     if (out->cost != NULL) {
         *out->cost = sum.cost;
@@ -163,6 +178,9 @@ static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     dynamics_pattern(f, A, B);
+    for (int32_t i = 0; i < n_x; i++) {
+        zz[i * n_z + i] = 1; /* the prior */
+    }
     for (int32_t i = 0; i < ocp->n_terms; i++) {
         mhi_term_pattern(&ocp->terms[i], &ocp->signals, n_z, columns, zz);
     }
@@ -273,6 +291,8 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->u_upper = filled(&ocp->arena, n * ocp->face.n_u, INFINITY);
     ocp->targets = filled(&ocp->arena, (n + 1) * ocp->signals.n_y, NAN);
     ocp->times = filled(&ocp->arena, n + 1, 0);
+    ocp->prior_centre = filled(&ocp->arena, ocp->face.n_x, 0);
+    ocp->prior_weight = filled(&ocp->arena, ocp->face.n_x, 0);
     for (int32_t k = 0; k <= n && ocp->times != NULL; k++) {
         ocp->times[k] = k * ocp->interval;
     }
@@ -283,7 +303,7 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->workers = MHI_TAKE(&ocp->arena, worker, ocp->face.n_workers);
     ocp->terms = MHI_TAKE(&ocp->arena, mhi_term, ocp->n_terms);
     if (!ocp->x_lower || !ocp->x_upper || !ocp->u_lower || !ocp->u_upper || !ocp->targets ||
-        !ocp->times || !ocp->workers || !ocp->terms) {
+        !ocp->times || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers || !ocp->terms) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;
@@ -401,6 +421,11 @@ double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k) {
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {
     ocp->interval = interval;
     ocp->problem.interval = interval;
+}
+
+void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight) {
+    memcpy(ocp->prior_centre, centre, sizeof(double) * (size_t)ocp->face.n_x);
+    memcpy(ocp->prior_weight, weight, sizeof(double) * (size_t)ocp->face.n_x);
 }
 
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {

@@ -47,6 +47,10 @@ double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval);    /* s, of all intervals */
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time); /* s, told to costs */
 
+/* Adds 1/2 sum_i weight_i (x_i - centre_i)^2 to node 0; both [n_x], copied. All weights 0 (as at
+ * the start): none. */
+void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight);
+
 /* x_next = F(x, u) by worker 0. */
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
                            mhe_error *err);
