@@ -239,6 +239,16 @@ static void unknown_plugins(void **state) {
     release(&o);
 }
 
+static void absent_plugin_folder(void **state) {
+    (void)state;
+    write_file(FILE_NAME, "# a comment\nplugin_path: [nowhere]\n" COSTS);
+    struct outcome o = read_path(FILE_NAME, NULL, 0);
+    assert_int_not_equal(o.status, MHE_OK);
+    assert_non_null(strstr(o.err.text, FILE_NAME ":2: "));
+    assert_non_null(strstr(o.err.text, TEST_FOLDER "/nowhere"));
+    release(&o);
+}
+
 static void unreadable_file(void **state) {
     (void)state;
     struct outcome o = read_path(TEST_FOLDER "/absent.yaml", NULL, 0);
@@ -318,15 +328,11 @@ static void tables_are_documented(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults_of_the_core),
-        cmocka_unit_test(values_of_the_file),
-        cmocka_unit_test(assignments),
-        cmocka_unit_test(wrong_sections),
-        cmocka_unit_test(wrong_plugin_sections),
-        cmocka_unit_test(unknown_plugins),
-        cmocka_unit_test(unreadable_file),
-        cmocka_unit_test(relative_file_name),
-        cmocka_unit_test(resolved_run_reads_back),
+        cmocka_unit_test(defaults_of_the_core),  cmocka_unit_test(values_of_the_file),
+        cmocka_unit_test(assignments),           cmocka_unit_test(wrong_sections),
+        cmocka_unit_test(wrong_plugin_sections), cmocka_unit_test(unknown_plugins),
+        cmocka_unit_test(unreadable_file),       cmocka_unit_test(absent_plugin_folder),
+        cmocka_unit_test(relative_file_name),    cmocka_unit_test(resolved_run_reads_back),
         cmocka_unit_test(tables_are_documented),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

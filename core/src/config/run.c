@@ -123,9 +123,16 @@ static mhe_status read_top(const struct reader *r) {
     }
     run->plugin_path = (mhe_text_list){.values = folders, .n = top.plugin_path.n};
     for (int32_t i = 0; i < top.plugin_path.n && status == MHE_OK; i++) {
+        mhe_error why = {0};
         folders[i] = mhi_path_absolute(run->dir, top.plugin_path.values[i], &run->arena);
-        status = folders[i] == NULL ? no_memory(r)
-                                    : mhi_registry_add_folder(r->registry, folders[i], r->err);
+        if (folders[i] == NULL) {
+            return no_memory(r);
+        }
+        status = mhi_registry_add_folder(r->registry, folders[i], &why);
+        if (status != MHE_OK) {
+            status = mhi_fail_at(r->err, status, run->tree, section_node(run, "plugin_path"), "%s",
+                                 why.text);
+        }
     }
     return status;
 }
