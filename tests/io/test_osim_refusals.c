@@ -184,12 +184,14 @@ static void unsupported_things_are_named(void **state) {
 
 static void what_does_nothing_is_not_listed(void **state) {
     (void)state;
-    const char *text = DOCUMENT("<credits>x</credits>" ARM_WITH(
-        "<WrapObjectSet><objects><WrapCylinder name=\"w\"/>"
-        "</objects></WrapObjectSet>\n",
-        "") SET("ConstraintSet", "<WeldConstraint name=\"c\"><isEnforced>false</isEnforced>"
+    const char *text = DOCUMENT(
+        "<credits>x</credits><VisibleObject/><ProbeSet file=\"\"/><ControllerSet "
+        "file=\"\"/>" ARM_WITH("<WrapObjectSet><objects><WrapCylinder name=\"w\"/>"
+                               "</objects></WrapObjectSet>\n",
+                               "")
+            SET("ConstraintSet", "<WeldConstraint name=\"c\"><isEnforced>false</isEnforced>"
                                  "</WeldConstraint>\n")
-                                    SET("ContactGeometrySet", "<ContactSphere name=\"s\"/>\n"));
+                SET("ContactGeometrySet", "<ContactSphere name=\"s\"/>\n"));
     mhe_description *d = NULL;
     mhe_error err = {0};
     assert_int_equal(mhi_osim_parse("m", text, strlen(text), &d, &err), MHE_OK);

@@ -50,7 +50,7 @@ static void list_unknown(mhi_osim *o) {
         "ControllerSet",   "ContactGeometrySet", "ProbeSet",      "ComponentSet",
         "components",      "defaults",           "WrapObjectSet", "ModelVisualPreferences",
         "ModelVisualizer", "show_visualizer",    "FrameSet",      "frames",
-        "notes",           "model_version"};
+        "notes",           "model_version",      "VisibleObject"};
     for (xmlNode *n = mhi_xml_first(o->model); n != NULL; n = mhi_xml_next(n)) {
         if (!is_one_of(n, known, sizeof known / sizeof *known)) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>", (const char *)n->name);

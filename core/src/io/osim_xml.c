@@ -48,15 +48,20 @@ xmlNode *mhi_xml_property(xmlNode *object, const char *name) {
     return found;
 }
 
-const char *mhi_xml_name(mhi_osim *o, const xmlNode *node) {
+/* Value of an attribute; "" where it is absent. */
+static const char *attribute(mhi_osim *o, const xmlNode *node, const char *name) {
     for (const xmlAttr *a = node->properties; a != NULL; a = a->next) {
-        if (strcmp((const char *)a->name, "name") == 0 && a->children != NULL &&
+        if (strcmp((const char *)a->name, name) == 0 && a->children != NULL &&
             a->children->type == XML_TEXT_NODE) {
             const char *copy = mhi_arena_text(&o->b.arena, (const char *)a->children->content);
             return copy != NULL ? copy : "";
         }
     }
     return "";
+}
+
+const char *mhi_xml_name(mhi_osim *o, const xmlNode *node) {
+    return attribute(o, node, "name");
 }
 
 const char *mhi_xml_text(mhi_osim *o, const xmlNode *node) {
@@ -131,7 +136,7 @@ int32_t mhi_xml_flag(mhi_osim *o, xmlNode *object, const char *name) {
 
 xmlNode *mhi_xml_objects(mhi_osim *o, xmlNode *parent, const char *set) {
     xmlNode *node = mhi_xml_child(parent, set);
-    if (node != NULL && xmlHasProp(node, (const xmlChar *)"file") != NULL) {
+    if (node != NULL && *attribute(o, node, "file") != '\0') {
         mhi_build_unsupported(&o->b, mhi_xml_line(node), "<%s> kept in another file", set);
     }
     return mhi_xml_first(mhi_xml_child(node, "objects"));
