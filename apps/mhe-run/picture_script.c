@@ -171,7 +171,7 @@ void picture_script(const picture *p, mhi_text *script) {
     add_look(script, height, time);
     for (int32_t i = 0; i < p->n_panels; i++) {
         const picture_panel *panel = &p->panels[i];
-        y[i] = (range){INFINITY, -INFINITY};
+        y[i] = panel->of_forces ? (range){0, 0} : (range){INFINITY, -INFINITY};
         add_data(script, "estimate", i, panel->of_forces ? p->forces : p->estimates, panel->column,
                  panel->of_forces ? 1 : DEGREES, time, &y[i]);
         if (panel->reference_column >= 0) {

@@ -135,6 +135,9 @@ mhe_status mhi_table_row(mhi_table_reader *reader, int32_t first) {
     if (status == MHE_OK) {
         status = take_time(reader, reader->cells[first]);
     }
+    if (status != MHE_OK) {
+        return status;
+    }
     double *row = table->values + (size_t)table->n_rows * (size_t)table->n_columns;
     for (int32_t i = 0; i < table->n_columns && status == MHE_OK; i++) {
         status = take_value(reader, i, reader->cells[first + 1 + i], &row[i]);
@@ -176,7 +179,7 @@ static mhe_status settle_rate(mhi_table_reader *reader) {
     mhi_table *table = reader->table;
     double measured = 0;
     mhe_status status = measure_rate(reader, &measured);
-    if (status != MHE_OK || measured == 0) {
+    if (status != MHE_OK || measured == 0 || !isfinite(measured)) {
         return status;
     }
     if (table->rate > 0 && fabs(measured / table->rate - 1) > 0.01) {
