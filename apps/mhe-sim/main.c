@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mhe-sim: simulated motions. */
 #include "console.h"
-#include "forward.h"
+#include "motion.h"
 
 #include <mhe/version.h>
 #include <stdio.h>
@@ -9,29 +9,33 @@
 #include <string.h>
 
 static const char help[] =
-    "Simulates motions of a musculoskeletal model.\n"
+    "Simulates motions of a musculoskeletal model; CVODES carries the state.\n"
     "\n"
-    "  mhe-sim forward CONFIG.yaml --excitations FILE.sto [--rate HZ] [--out DIR]\n"
-    "                  [--set path.to.key=value]...\n"
+    "  mhe-sim forward CONFIG.yaml --input EXCITATIONS.sto [options]\n"
+    "  mhe-sim follow CONFIG.yaml --input POSTURES.sto [options]\n"
     "  mhe-sim --version | --help\n"
     "\n"
-    "forward: integrates the config's model from its initial state under the excitations of the "
-    "file (one\n"
-    "column a muscle, linear between rows) with the config's integrator, and writes "
-    "reference.sto,\n"
-    "markers.trc and emg.sto to DIR (./out/<config name>-sim unless given), 100 rows a second "
-    "unless --rate\n"
-    "says otherwise. Exit status: 0 done; 1 failed; 2 the command line or an input is wrong.\n";
+    "forward: from the config's initial state under the excitations of the file (one column a "
+    "muscle, linear\n"
+    "between rows). follow: through the postures of the file (one column a coordinate, a "
+    "minimum-jerk path\n"
+    "from row to row) with muscle controls that the config's costs and solver find on the way.\n"
+    "\n"
+    "Both write reference.sto (the truth), markers.trc and emg.sto.\n"
+    "  --out DIR                 default ./out/<config name>-sim\n"
+    "  --rate HZ                 rows a second, default 100\n"
+    "  --set path.to.key=value   overrides the config\n"
+    "Exit status: 0 done; 1 failed; 2 the command line or an input is wrong.\n";
 
 typedef struct arguments {
-    const char *config, *excitations, *out;
+    const char *config, *input, *out;
     const char **set;
     int32_t n_set;
     double rate;
 } arguments;
 
-static const char *const words[] = {"forward", "--excitations", "--rate", "--out",
-                                    "--set",   "--version",     "--help"};
+static const char *const words[] = {"forward", "follow", "--input",   "--rate",
+                                    "--out",   "--set",  "--version", "--help"};
 
 static mhe_status parse(int argc, char **argv, arguments *a, mhe_error *err) {
     for (int i = 2; i < argc; i++) {
@@ -45,8 +49,8 @@ static mhe_status parse(int argc, char **argv, arguments *a, mhe_error *err) {
             return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", word);
         }
         const char *value = argv[++i];
-        if (strcmp(word, "--excitations") == 0) {
-            a->excitations = value;
+        if (strcmp(word, "--input") == 0) {
+            a->input = value;
         } else if (strcmp(word, "--out") == 0) {
             a->out = value;
         } else if (strcmp(word, "--set") == 0) {
@@ -64,38 +68,40 @@ static mhe_status parse(int argc, char **argv, arguments *a, mhe_error *err) {
                 mhi_suggest(hint, sizeof hint, word, words, sizeof words / sizeof words[0]));
         }
     }
-    if (a->config == NULL || a->excitations == NULL) {
+    if (a->config == NULL || a->input == NULL) {
         return mhe_fail(err, MHE_E_ARGUMENT,
-                        "a config file and --excitations are needed; 'mhe-sim --help'");
+                        "a config file and --input are needed; 'mhe-sim --help'");
     }
     return MHE_OK;
 }
 
-static mhe_status run_forward(int argc, char **argv, mhe_error *err) {
+typedef mhe_status (*motion)(const motion_setup *setup, mhe_error *err);
+
+static mhe_status run(motion move, int argc, char **argv, mhe_error *err) {
     const mhe_host host = console_host("mhe-sim");
     arguments a = {.rate = 100, .set = calloc((size_t)argc, sizeof(char *))};
     mhi_registry *registry = NULL;
-    mhi_run *run = NULL;
+    mhi_run *config = NULL;
     mhe_status status =
         a.set == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : parse(argc, argv, &a, err);
     if (status == MHE_OK) {
         status = mhi_registry_create(&host, &registry, err);
     }
     if (status == MHE_OK) {
-        status = mhi_run_read(a.config, a.set, a.n_set, registry, &run, err);
+        status = mhi_run_read(a.config, a.set, a.n_set, registry, &config, err);
     }
     if (status == MHE_OK) {
         mhi_text out = {0};
-        mhi_text_add(&out, "%s%s%s", a.out != NULL ? a.out : "out/", a.out != NULL ? "" : run->name,
-                     a.out != NULL ? "" : "-sim");
-        const forward_setup setup = {run, &host, a.excitations, a.rate, out.data};
-        status = out.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : forward(&setup, err);
+        mhi_text_add(&out, "%s%s%s", a.out != NULL ? a.out : "out/",
+                     a.out != NULL ? "" : config->name, a.out != NULL ? "" : "-sim");
+        const motion_setup setup = {config, &host, registry, a.input, a.rate, out.data};
+        status = out.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : move(&setup, err);
         if (status == MHE_OK) {
             (void)printf("results in %s\n", out.data);
         }
         mhi_text_free(&out);
     }
-    mhi_run_free(run);
+    mhi_run_free(config);
     mhi_registry_free(registry);
     free(a.set);
     return status;
@@ -105,7 +111,9 @@ int main(int argc, char **argv) {
     mhe_error err = {0};
     mhe_status status = MHE_OK;
     if (argc >= 2 && strcmp(argv[1], "forward") == 0) {
-        status = run_forward(argc, argv, &err);
+        status = run(motion_forward, argc, argv, &err);
+    } else if (argc >= 2 && strcmp(argv[1], "follow") == 0) {
+        status = run(motion_follow, argc, argv, &err);
     } else if (argc >= 2 && strcmp(argv[1], "--version") == 0) {
         (void)printf("mhe-sim %s\n", MHE_VERSION);
     } else if (argc >= 2 && strcmp(argv[1], "--help") == 0) {
@@ -114,7 +122,7 @@ int main(int argc, char **argv) {
         char hint[256];
         status = mhe_fail(&err, MHE_E_ARGUMENT, "%s'%s'%s",
                           argc >= 2 ? "unknown command " : "no command ", argc >= 2 ? argv[1] : "",
-                          mhi_suggest(hint, sizeof hint, argc >= 2 ? argv[1] : "", words, 1));
+                          mhi_suggest(hint, sizeof hint, argc >= 2 ? argv[1] : "", words, 2));
     }
     if (status != MHE_OK) {
         (void)fprintf(stderr, "mhe-sim: %s\n", err.text);

@@ -17,5 +17,8 @@ mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
 /* First state from outside the config (a reference); q, qdot [n_q], before the first push. What the
  * config itself gives is kept. */
 void mhi_estimator_set_start(mhe_estimator *estimator, const double *q, const double *qdot);
+/* The state the next window starts from, instead of what the last solution expects: x [n_x]. After
+ * a push that was `ready`. */
+void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
 
 #endif

@@ -247,6 +247,10 @@ void mhi_estimator_set_start(mhe_estimator *e, const double *q, const double *qd
     e->start_known = 1;
 }
 
+void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
+    memcpy(e->solution.x, x, sizeof(double) * (size_t)e->n_x);
+}
+
 void mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *info) {
     const mhe_problem *p = mhi_ocp_problem(e->ocp);
     *info = (mhe_estimator_info){.size = sizeof *info,

@@ -1,0 +1,145 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "simulation.h"
+
+#include "config/options.h"
+
+#include <mhe/integrator.h>
+#include <string.h>
+
+#define PLANT "mhe.integrator.sundials"
+
+static mhe_status open_integrator(simulation *s, const mhe_host *host, mhi_registry *registry,
+                                  mhe_error *err) {
+    const mhe_plugin *plugin = NULL;
+    mhe_status status = mhi_registry_find(registry, PLANT, MHE_INTEGRATOR_IFACE, &plugin, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    void *config = mhi_arena_take(&s->arena, plugin->config_size);
+    if (config == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    status = mhi_options_fill(plugin->options, (int32_t)plugin->option_count, s->run->tree, NULL,
+                              NULL, 0, plugin->id, s->run->dir, &s->arena, config, err);
+    s->integrator = plugin->ops;
+    if (status == MHE_OK) {
+        status = s->integrator->create(host, mhi_system_face(s->system), config,
+                                       &s->integrator_self, err);
+    }
+    if (status == MHE_OK) {
+        status = s->integrator->context_create(s->integrator_self, s->context,
+                                               &s->integrator_context, err);
+    }
+    return status;
+}
+
+mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *system,
+                           const mhe_host *host, mhi_registry *registry, double rate,
+                           mhe_error *err) {
+    const mhe_system *f = mhi_system_face(system);
+    const mhe_description *d = mhi_system_description(system);
+    *s = (simulation){
+        .run = run, .system = system, .rate = rate, .n_q = f->n_q, .n_m = f->n_m, .n_x = f->n_x};
+    s->x = MHI_TAKE(&s->arena, double, f->n_x);
+    s->x_next = MHI_TAKE(&s->arena, double, f->n_x);
+    s->u = MHI_TAKE(&s->arena, double, f->n_u);
+    s->row = MHI_TAKE(&s->arena, double, 2 * f->n_q + 3 * f->n_m);
+    s->marker = MHI_TAKE(&s->arena, double, 3 * d->n_markers);
+    s->muscles = MHI_TAKE(&s->arena, const char *, f->n_m);
+    if (!s->x || !s->x_next || !s->u || !s->row || !s->marker || !s->muscles) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < f->n_m; i++) {
+        s->muscles[i] = d->muscles[i].name;
+    }
+    mhe_status status = mhi_system_context_create(system, &s->context, err);
+    return status == MHE_OK ? open_integrator(s, host, registry, err) : status;
+}
+
+mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err) {
+    static const char *const prefix[] = {"q", "qdot", "a", "e", "F"};
+    const mhe_description *d = mhi_system_description(s->system);
+    const int32_t n_columns = 2 * s->n_q + 3 * s->n_m;
+    const char **labels = MHI_TAKE(&s->arena, const char *, n_columns);
+    const char **markers = MHI_TAKE(&s->arena, const char *, d->n_markers);
+    if (labels == NULL || markers == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t part = 0, n = 0; part < 5; part++) {
+        for (int32_t i = 0; i < (part < 2 ? s->n_q : s->n_m); i++) {
+            const char *name = part < 2 ? d->coordinates[i].name : d->muscles[i].name;
+            labels[n] = mhi_arena_format(&s->arena, "%s_%s", prefix[part], name);
+            if (labels[n++] == NULL) {
+                return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+            }
+        }
+    }
+    for (int32_t i = 0; i < d->n_markers; i++) {
+        markers[i] = d->markers[i].name;
+    }
+    mhe_status status = mhi_outbox_open(folder, &s->outbox, err);
+    if (status == MHE_OK) {
+        status = mhi_sink_sto(s->outbox, "reference.sto", "reference", labels, n_columns,
+                              &s->reference, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_sink_trc(s->outbox, "markers.trc", markers, d->n_markers, s->rate, 1e-3, "mm",
+                              &s->trc, err);
+    }
+    if (status == MHE_OK) {
+        status =
+            mhi_sink_sto(s->outbox, "emg.sto", "EMG, normalised", s->muscles, s->n_m, &s->emg, err);
+    }
+    return status;
+}
+
+mhe_status simulation_write(simulation *s, double time, mhe_error *err) {
+    const int driven = s->n_x > 2 * s->n_q;
+    const double *a = driven ? s->x + 2 * s->n_q : s->u;
+    const size_t n_m = sizeof(double) * (size_t)s->n_m;
+    mhi_muscle_state muscles;
+    mhe_status status = mhi_system_muscles(s->context, s->x, s->x + s->n_q, a, 0, &muscles, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    double *row = s->row;
+    memcpy(row, s->x, sizeof(double) * (size_t)(2 * s->n_q));
+    memcpy(row + 2 * s->n_q, a, n_m);
+    memcpy(row + 2 * s->n_q + s->n_m, s->u, n_m);
+    memcpy(row + 2 * s->n_q + 2 * s->n_m, muscles.force, n_m);
+    status = mhi_sink_row(s->reference, time, row, err);
+    if (status == MHE_OK) {
+        status = mhi_system_markers(s->context, s->x, s->marker, NULL, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_sink_row(s->trc, time, s->marker, err);
+    }
+    return status == MHE_OK ? mhi_sink_row(s->emg, time, s->u, err) : status;
+}
+
+mhe_status simulation_step(simulation *s, double time, mhe_error *err) {
+    mhe_status status = s->integrator->step(s->integrator_context, s->x, s->u, 1 / s->rate,
+                                            s->x_next, NULL, NULL, err);
+    if (status != MHE_OK) {
+        const mhe_error why = *err;
+        return mhe_fail(err, MHE_E_NUMERIC, "integration stopped at %g s: %.500s", time, why.text);
+    }
+    memcpy(s->x, s->x_next, sizeof(double) * (size_t)s->n_x);
+    return MHE_OK;
+}
+
+mhe_status simulation_commit(simulation *s, mhe_error *err) {
+    return mhi_outbox_commit(s->outbox, err);
+}
+
+void simulation_close(simulation *s) {
+    mhi_outbox_close(s->outbox);
+    if (s->integrator_context != NULL) {
+        s->integrator->context_destroy(s->integrator_context);
+    }
+    if (s->integrator_self != NULL) {
+        s->integrator->destroy(s->integrator_self);
+    }
+    mhi_system_context_free(s->context);
+    mhi_arena_free(&s->arena);
+}

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* simulation.h: a model that moves: its state, the CVODES step, and the files an experiment would
+ * have recorded. */
+#ifndef SIMULATION_H
+#define SIMULATION_H
+
+#include "base/arena.h"
+#include "config/run.h"
+#include "io/sink.h"
+#include "model/system.h"
+
+#include <mhe/integrator.h>
+
+typedef struct simulation {
+    const mhi_run *run;
+    const mhi_system *system;
+    double rate; /* Hz */
+    int32_t n_q, n_m, n_x;
+    double *x, *u;        /* [n_x] state, [n_u] muscle controls, constant over a step */
+    const char **muscles; /* [n_m] names */
+    mhi_system_context *context;
+    const mhe_integrator_ops *integrator;
+    void *integrator_self, *integrator_context;
+    double *x_next, *row, *marker;
+    mhi_outbox *outbox;
+    mhi_sink *reference, *trc, *emg;
+    mhi_arena arena;
+} simulation;
+
+/* Takes memory and the integrator (mhe.integrator.sundials) for a system that outlives the
+ * simulation. [cold] */
+mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *system,
+                           const mhe_host *host, mhi_registry *registry, double rate,
+                           mhe_error *err);
+/* Opens reference.sto, markers.trc and emg.sto in the folder. */
+mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err);
+/* Writes state, controls, forces and markers at a time. */
+mhe_status simulation_write(simulation *s, double time, mhe_error *err);
+/* Carries the state over 1/rate seconds. */
+mhe_status simulation_step(simulation *s, double time, mhe_error *err);
+mhe_status simulation_commit(simulation *s, mhe_error *err);
+/* Without a commit before, no file appears. */
+void simulation_close(simulation *s);
+
+#endif
