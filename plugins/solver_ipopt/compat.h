@@ -15,6 +15,7 @@ typedef bool compat_bool;
 typedef Index compat_index;
 typedef Number compat_number;
 typedef Bool compat_bool;
+#define Maximum_WallTime_Exceeded (-5)
 #endif
 
 #endif

@@ -11,7 +11,7 @@ struct ipopt_config { /* filled from the option table of solver_ipopt.c */
     int32_t max_iterations;
     double acceptable_tolerance;
     int32_t acceptable_iterations;
-    int32_t mu_strategy; /* position in "adaptive|monotone" */
+    int32_t mu_strategy; /* position in "auto|adaptive|monotone" */
     double mu_init_warm;
     double objective_scale;
     const char *linear_solver;

@@ -98,7 +98,6 @@ mhe_status ipopt_configure(IpoptProblem ipopt, const struct ipopt_config *config
     }
     AddIpoptIntOption(ipopt, "max_iter", config->max_iterations);
     AddIpoptIntOption(ipopt, "acceptable_iter", config->acceptable_iterations);
-    set(ipopt, "mu_strategy", config->mu_strategy == 0 ? "adaptive" : "monotone");
     if (!set(ipopt, "linear_solver", config->linear_solver)) {
         return refused("linear_solver", config->linear_solver, err);
     }
@@ -141,9 +140,15 @@ static const char *chosen(const struct ipopt_config *config, const char *name,
 }
 
 void ipopt_warm_start(IpoptProblem ipopt, const struct ipopt_config *config, int32_t warm) {
-    set(ipopt, "warm_start_init_point",
-        chosen(config, "warm_start_init_point", warm ? "yes" : "no"));
+    /* A barrier parameter that stays where the last solve left it needs the fewest iterations, but
+     * only near a solution. */
+    int32_t adaptive = config->mu_strategy == 1 || (config->mu_strategy == 0 && !warm);
     char mu[32];
     (void)snprintf(mu, sizeof mu, "%.17g", warm ? config->mu_init_warm : 0.1);
-    set(ipopt, "mu_init", chosen(config, "mu_init", mu));
+    const char *const options[][2] = {{"warm_start_init_point", warm ? "yes" : "no"},
+                                      {"mu_strategy", adaptive ? "adaptive" : "monotone"},
+                                      {"mu_init", mu}};
+    for (size_t i = 0; i < sizeof options / sizeof options[0]; i++) {
+        set(ipopt, options[i][0], chosen(config, options[i][0], options[i][1]));
+    }
 }

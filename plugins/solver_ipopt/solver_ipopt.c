@@ -16,10 +16,11 @@ static const mhe_option ipopt_options[] = {
                  "Violation that counts as converged after acceptable_iterations in a row."),
     MHE_OPT_INT(struct ipopt_config, acceptable_iterations, 0, 0, 1000, "1",
                 "Iterations within acceptable_tolerance that end a solve; 0: never."),
-    MHE_OPT_ENUM(struct ipopt_config, mu_strategy, "adaptive", "adaptive|monotone",
-                 "How the barrier parameter is lowered."),
-    MHE_OPT_REAL(struct ipopt_config, mu_init_warm, 1e-6, 1e-12, 1e3, "1",
-                 "First barrier parameter of a solve that starts with multipliers (monotone)."),
+    MHE_OPT_ENUM(struct ipopt_config, mu_strategy, "auto", "auto|adaptive|monotone",
+                 "How the barrier parameter is lowered; auto: monotone after a start with "
+                 "multipliers, else adaptive."),
+    MHE_OPT_REAL(struct ipopt_config, mu_init_warm, 3e-7, 1e-12, 1e3, "1",
+                 "First barrier parameter of a monotone solve that starts with multipliers."),
     MHE_OPT_REAL(struct ipopt_config, objective_scale, 0, 0, 1e12, "1",
                  "Factor on the objective inside Ipopt; 0: makes the mean curvature of the "
                  "controls 1 at the first start."),
@@ -147,6 +148,7 @@ static int32_t outcome(const ipopt_solver *s, int32_t verdict, double primal_res
     case Maximum_Iterations_Exceeded:
         return MHE_SOLVE_ITERATION_LIMIT;
     case Maximum_CpuTime_Exceeded:
+    case Maximum_WallTime_Exceeded:
         return MHE_SOLVE_DEADLINE;
     case User_Requested_Stop:
         return s->stopped != 0 ? s->stopped : MHE_SOLVE_FAILED;

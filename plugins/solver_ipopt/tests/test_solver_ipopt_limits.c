@@ -216,6 +216,23 @@ static void test_options(void **state) {
     toy_free(&t);
 }
 
+/* Ipopt knows the name but finds no library of it: told at the first solve, not on the console. */
+static void test_missing_linear_solver(void **state) {
+    (void)state;
+    toy t;
+    rig r;
+    toy_pendulum(&t, 5);
+    assert_int_equal(rig_open(&r, &t, "{linear_solver: ma27}"),
+                     MHE_OK);
+    mhe_status status = rig_solve(&r, NULL);
+    if (status != MHE_OK) { /* else HSL is installed here */
+        assert_int_equal(status, MHE_E_NUMERIC);
+        assert_non_null(strstr(r.error.text, "linear solver 'ma27'"));
+    }
+    rig_close(&r);
+    toy_free(&t);
+}
+
 /* Nothing on the console, not for a refused option either, and no ipopt.opt from the working
  * directory, whose "max_iter 0" would show. */
 static void test_silent(void **state) {
@@ -268,6 +285,7 @@ int main(void) {
         cmocka_unit_test(test_evaluation_gives_up),
         cmocka_unit_test(test_stops),
         cmocka_unit_test(test_options),
+        cmocka_unit_test(test_missing_linear_solver),
         cmocka_unit_test(test_silent),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
