@@ -222,8 +222,7 @@ static void test_missing_linear_solver(void **state) {
     toy t;
     rig r;
     toy_pendulum(&t, 5);
-    assert_int_equal(rig_open(&r, &t, "{linear_solver: ma27}"),
-                     MHE_OK);
+    assert_int_equal(rig_open(&r, &t, "{linear_solver: ma27}"), MHE_OK);
     mhe_status status = rig_solve(&r, NULL);
     if (status != MHE_OK) { /* else HSL is installed here */
         assert_int_equal(status, MHE_E_NUMERIC);
