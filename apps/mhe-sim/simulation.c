@@ -2,8 +2,8 @@
 #include "simulation.h"
 
 #include "config/options.h"
+#include "plugin/instance.h"
 
-#include <mhe/integrator.h>
 #include <string.h>
 
 #define PLANT "mhe.integrator.sundials"

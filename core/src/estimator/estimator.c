@@ -2,6 +2,7 @@
 /* estimator.c: the public estimator: frames in, estimates out. */
 #include "estimator/estimator_private.h"
 #include "io/model_file.h"
+#include "plugin/instance.h"
 
 #include <math.h>
 #include <stdlib.h>

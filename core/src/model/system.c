@@ -3,6 +3,7 @@
 
 #include "base/arena.h"
 #include "base/cholesky.h"
+#include "plugin/instance.h"
 
 #include <math.h>
 #include <string.h>
@@ -238,10 +239,11 @@ mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system,
     s->model = setup->model->ops;
     s->muscle = setup->muscle->ops;
     set_sizes(s, setup);
-    mhe_status status = s->model->create(setup->host, d, setup->model_config, &s->model_self, err);
+    mhe_status status =
+        mhi_model_create(setup->model, setup->host, d, setup->model_config, &s->model_self, err);
     if (status == MHE_OK) {
-        status = s->muscle->create(setup->host, d->muscles, d->n_muscles, setup->muscle_config,
-                                   &s->muscle_self, err);
+        status = mhi_muscle_create(setup->muscle, setup->host, d->muscles, d->n_muscles,
+                                   setup->muscle_config, &s->muscle_self, err);
     }
     if (status != MHE_OK) {
         mhi_system_free(s);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ocp/term.h"
 
+#include "plugin/instance.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -33,15 +35,11 @@ mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
                     .id = setup->plugin->id,
                     .self = setup->config,
                     .factor = setup->weight / (setup->sigma * setup->sigma)};
+    mhe_status status =
+        mhi_cost_create(setup->plugin, host, problem, setup->config, &t->created, &t->layout, err);
     if (t->ops->create != NULL) {
-        mhe_status status = t->ops->create(host, problem, setup->config, &t->created, err);
-        if (status != MHE_OK) {
-            return status;
-        }
         t->self = t->created;
     }
-    t->layout = (mhe_cost_layout){.size = sizeof t->layout};
-    mhe_status status = t->ops->layout(t->self, problem, &t->layout, err);
     if (status == MHE_OK) {
         status = check_layout(t, signals, err);
     }

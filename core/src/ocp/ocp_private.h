@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* ocp_private.h: the problem's parts, shared by its evaluation (ocp.c) and its making
+ * (ocp_build.c). */
+#ifndef MHI_OCP_PRIVATE_H
+#define MHI_OCP_PRIVATE_H
+
+#include "ocp/ocp.h"
+
+/* Memory of one thread. */
+typedef struct mhi_ocp_worker {
+    mhi_system_context *system;
+    void *integrator;
+    mhi_term_workspace *terms;  /* [n_terms] */
+    double *y, *jacobian;       /* of all signals */
+    double *gradient, *hessian; /* [n_z], [n_z x n_z] */
+} mhi_ocp_worker;
+
+struct mhi_ocp {
+    mhe_stage_problem face;
+    mhe_problem problem;
+    mhi_signals signals;
+    const mhi_system *system;
+    const mhe_integrator_ops *integrator;
+    void *integrator_self;
+    mhi_term *terms;
+    int32_t n_terms, n_terms_created, n_workers_created;
+    uint32_t wanted; /* signals any term reads */
+    double interval;
+    double *x_lower, *x_upper, *u_lower, *u_upper;
+    double *targets;                     /* [(N+1) x n_y] */
+    double *times;                       /* [N+1] */
+    double *prior_centre, *prior_weight; /* [n_x] */
+    mhi_ocp_worker *workers;
+    mhi_arena arena;
+};
+
+/* The functions that the solver and the costs call. */
+int32_t mhi_ocp_find_signal(const mhe_problem *problem, const char *name, int32_t *n_y,
+                            const char **unit);
+mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker, int32_t k,
+                            const double *x, const double *u, const mhe_stage_values *out,
+                            mhe_error *err);
+
+#endif

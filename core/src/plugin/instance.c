@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "plugin/instance.h"
+
+#include "plugin/guard.h"
+
+/* The arguments of any create(), carried through the guard. */
+typedef struct call {
+    const void *ops;
+    const mhe_host *host;
+    const void *subject; /* description, muscles, system, problem */
+    int32_t n_muscles;
+    const void *config;
+    void **self;
+    mhe_cost_layout *layout;
+    mhe_error *err;
+} call;
+
+static mhe_status guarded(mhe_status (*function)(void *), const mhe_plugin *plugin, call *c) {
+    *c->self = NULL;
+    c->ops = plugin->ops;
+    mhe_status status = mhi_guard(function, c, c->err);
+    if (status == MHE_E_PLUGIN && c->err != NULL) {
+        const mhe_error why = *c->err;
+        return mhe_fail(c->err, status, "%s: %.600s", plugin->id, why.text);
+    }
+    return status;
+}
+
+static mhe_status create_model(void *data) {
+    const call *c = data;
+    const mhe_model_ops *ops = c->ops;
+    return ops->create(c->host, c->subject, c->config, c->self, c->err);
+}
+
+static mhe_status create_muscle(void *data) {
+    const call *c = data;
+    const mhe_muscle_ops *ops = c->ops;
+    return ops->create(c->host, c->subject, c->n_muscles, c->config, c->self, c->err);
+}
+
+static mhe_status create_integrator(void *data) {
+    const call *c = data;
+    const mhe_integrator_ops *ops = c->ops;
+    return ops->create(c->host, c->subject, c->config, c->self, c->err);
+}
+
+static mhe_status create_solver(void *data) {
+    const call *c = data;
+    const mhe_solver_ops *ops = c->ops;
+    return ops->create(c->host, c->subject, c->config, c->self, c->err);
+}
+
+static mhe_status create_cost(void *data) {
+    const call *c = data;
+    const mhe_cost_ops *ops = c->ops;
+    mhe_status status = MHE_OK;
+    if (ops->create != NULL) {
+        status = ops->create(c->host, c->subject, c->config, c->self, c->err);
+    }
+    if (status == MHE_OK) {
+        status =
+            ops->layout(ops->create != NULL ? *c->self : c->config, c->subject, c->layout, c->err);
+    }
+    return status;
+}
+
+mhe_status mhi_model_create(const mhe_plugin *plugin, const mhe_host *host,
+                            const mhe_description *description, const void *config, void **self,
+                            mhe_error *err) {
+    call c = {.host = host, .subject = description, .config = config, .self = self, .err = err};
+    return guarded(create_model, plugin, &c);
+}
+
+mhe_status mhi_muscle_create(const mhe_plugin *plugin, const mhe_host *host,
+                             const mhe_muscle *muscles, int32_t n_muscles, const void *config,
+                             void **self, mhe_error *err) {
+    call c = {.host = host,
+              .subject = muscles,
+              .n_muscles = n_muscles,
+              .config = config,
+              .self = self,
+              .err = err};
+    return guarded(create_muscle, plugin, &c);
+}
+
+mhe_status mhi_integrator_create(const mhe_plugin *plugin, const mhe_host *host,
+                                 const mhe_system *system, const void *config, void **self,
+                                 mhe_error *err) {
+    call c = {.host = host, .subject = system, .config = config, .self = self, .err = err};
+    return guarded(create_integrator, plugin, &c);
+}
+
+mhe_status mhi_solver_create(const mhe_plugin *plugin, const mhe_host *host,
+                             const mhe_stage_problem *problem, const void *config, void **self,
+                             mhe_error *err) {
+    call c = {.host = host, .subject = problem, .config = config, .self = self, .err = err};
+    return guarded(create_solver, plugin, &c);
+}
+
+mhe_status mhi_cost_create(const mhe_plugin *plugin, const mhe_host *host,
+                           const mhe_problem *problem, const void *config, void **self,
+                           mhe_cost_layout *layout, mhe_error *err) {
+    call c = {.host = host,
+              .subject = problem,
+              .config = config,
+              .self = self,
+              .layout = layout,
+              .err = err};
+    *layout = (mhe_cost_layout){.size = sizeof *layout};
+    return guarded(create_cost, plugin, &c);
+}
