@@ -115,6 +115,13 @@ static void wrong_yaml_is_refused(void **state) {
                    "2: did not find expected ',' or ']'");
 }
 
+static void quoted_keys_are_text(void **state) {
+    (void)state;
+    mhi_tree *tree = parse("'<<': {\"~\": 1}\n");
+    assert_string_equal(at(tree, "<<", "~")->text, "1");
+    mhi_tree_free(tree);
+}
+
 static void endless_trees_are_refused(void **state) {
     (void)state;
     assert_refused("a: &x [*x]\n",
@@ -265,11 +272,11 @@ static void unreadable_files(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(nodes_know_lines),          cmocka_unit_test(empty_file_is_empty_mapping),
-        cmocka_unit_test(anchors_are_copied),        cmocka_unit_test(wrong_yaml_is_refused),
-        cmocka_unit_test(endless_trees_are_refused), cmocka_unit_test(set_replaces_and_adds),
-        cmocka_unit_test(wrong_set_is_refused),      cmocka_unit_test(messages_point),
-        cmocka_unit_test(unreadable_files),
+        cmocka_unit_test(nodes_know_lines),      cmocka_unit_test(empty_file_is_empty_mapping),
+        cmocka_unit_test(anchors_are_copied),    cmocka_unit_test(quoted_keys_are_text),
+        cmocka_unit_test(wrong_yaml_is_refused), cmocka_unit_test(endless_trees_are_refused),
+        cmocka_unit_test(set_replaces_and_adds), cmocka_unit_test(wrong_set_is_refused),
+        cmocka_unit_test(messages_point),        cmocka_unit_test(unreadable_files),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

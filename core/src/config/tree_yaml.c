@@ -71,7 +71,7 @@ static mhe_status check_key(const struct loader *loader, const yaml_node_t *key,
     if (strlen(text) > MHI_TREE_KEY) {
         return fail(loader, line_of(key), "a key is longer than %d bytes", MHI_TREE_KEY);
     }
-    if (strcmp(text, "<<") == 0) {
+    if (strcmp(text, "<<") == 0 && key->data.scalar.style == YAML_PLAIN_SCALAR_STYLE) {
         return fail(loader, line_of(key), "merge keys ('<<') are not supported");
     }
     const mhi_node *first = mhi_node_find(mapping, text);
