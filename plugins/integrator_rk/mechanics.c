@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mechanics.c: the stage accelerations of one step, and the derivatives of the step.
  *
- * Implicit schemes: one evaluation with derivatives at the start of the step gives a Jacobian and a
- * predictor, namely the stages of the system linearised there. Simplified Newton iterations without
- * derivatives follow; where they are slow the Jacobian is taken anew at the stages. If derivatives
- * are wanted, a last evaluation with derivatives at the converged stages serves both a last full
- * Newton correction and the implicit function theorem. */
+ * Implicit schemes: one evaluation with derivatives at the start of the step gives a predictor, the
+ * stages of the system linearised there. Simplified Newton iterations follow, on the Jacobian of
+ * the middle stage (a hundredth to a thousandth of the error is left by each); where they are slow
+ * the Jacobian is taken anew at all stages, and where that fails too rk_step halves the step. If
+ * derivatives are wanted, a last evaluation with derivatives at the converged stages serves both a
+ * last full Newton correction and the implicit function theorem. */
 #include "lapack.h"
 #include "rk.h"
 
@@ -18,8 +19,8 @@
 #define RK_STALLED 1e-7
 /* Error left in the stages before, and largest size of, the last full correction: what it leaves is
  * of the order of its square, and the derivatives belong to stages that are off by no more. */
-#define RK_BEFORE_LAST 1e-7
-#define RK_LAST 1e-6
+#define RK_BEFORE_LAST 1e-6
+#define RK_LAST 1e-5
 #define RK_LAST_ROUNDS 3
 
 /* Stage position and velocity from the stage accelerations. */
@@ -55,23 +56,29 @@ static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, i
                                 c->stage_a + j * n_m, r, &out, err);
 }
 
-static mhe_status rk_evaluate_all(struct rk_context *c, const double *r, double h,
-                                  int32_t derivatives, mhe_error *err) {
+/* Where an iteration takes its Jacobian from. */
+enum { RK_JACOBIAN_KEPT, RK_JACOBIAN_MIDDLE, RK_JACOBIAN_ALL };
+
+static mhe_status rk_evaluate_all(struct rk_context *c, const double *r, double h, int jacobian,
+                                  mhe_error *err) {
+    int32_t s = c->rk->mechanics.stages;
     mhe_status status = MHE_OK;
-    for (int32_t j = 0; j < c->rk->mechanics.stages && status == MHE_OK; j++) {
+    for (int32_t j = 0; j < s && status == MHE_OK; j++) {
+        int32_t derivatives =
+            jacobian == RK_JACOBIAN_ALL || (jacobian == RK_JACOBIAN_MIDDLE && j == s / 2);
         status = rk_evaluate(c, r, h, j, derivatives, err);
     }
     return status;
 }
 
-/* LU of I - h^2 (A A) f_q - h A f_v, with derivatives per stage or one pair for all. Row-major: to
- * LAPACK it is the transpose. */
-static mhe_status rk_factor(struct rk_context *c, double h, int32_t per_stage, mhe_error *err) {
+/* LU of I - h^2 (A A) f_q - h A f_v; `only` is the stage whose derivatives serve all, -1: each its
+ * own. Row-major: to LAPACK it is the transpose. */
+static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, info = 0;
-    int32_t stride = per_stage ? n_q * n_q : 0;
     for (int32_t j = 0; j < s; j++) {
-        const double *f_q = c->f_q + j * stride, *f_v = c->f_v + j * stride;
+        int32_t from = (only < 0 ? j : only) * n_q * n_q;
+        const double *f_q = c->f_q + from, *f_v = c->f_v + from;
         for (int32_t k = 0; k < s; k++) {
             double by_q = h * h * t->AA[j * s + k], by_v = h * t->A[j * s + k];
             for (int32_t i = 0; i < n_q; i++) {
@@ -147,12 +154,12 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
 
 /* One iteration, with a new Jacobian or the one in place; `change` is the size of the correction.
  */
-static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, int32_t anew,
+static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, int jacobian,
                              double *change, mhe_error *err) {
-    int32_t n = c->rk->mechanics.stages * c->rk->system->n_q;
-    mhe_status status = rk_evaluate_all(c, r, h, anew, err);
-    if (status == MHE_OK && anew) {
-        status = rk_factor(c, h, 1, err);
+    int32_t s = c->rk->mechanics.stages, n = s * c->rk->system->n_q;
+    mhe_status status = rk_evaluate_all(c, r, h, jacobian, err);
+    if (status == MHE_OK && jacobian != RK_JACOBIAN_KEPT) {
+        status = rk_factor(c, h, jacobian == RK_JACOBIAN_ALL ? -1 : s / 2, err);
     }
     if (status != MHE_OK) {
         return status;
@@ -169,9 +176,9 @@ static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, in
 static mhe_status rk_newton(struct rk_context *c, const double *r, double h, double goal,
                             mhe_error *err) {
     double change = 0, last = 0, shrink = 1;
-    int32_t anew = 0;
+    int jacobian = RK_JACOBIAN_MIDDLE; /* nearer to all stages than the start's */
     for (int32_t iteration = 0; iteration < c->rk->config.max_newton; iteration++) {
-        mhe_status status = rk_iterate(c, r, h, anew, &change, err);
+        mhe_status status = rk_iterate(c, r, h, jacobian, &change, err);
         if (status != MHE_OK) {
             return status;
         }
@@ -180,7 +187,7 @@ static mhe_status rk_newton(struct rk_context *c, const double *r, double h, dou
         if (left < goal) {
             return MHE_OK;
         }
-        anew = iteration > 0 && shrink > RK_SLOW;
+        jacobian = iteration > 0 && shrink > RK_SLOW ? RK_JACOBIAN_ALL : RK_JACOBIAN_KEPT;
         last = change;
     }
     return change < RK_STALLED ? MHE_OK
@@ -199,7 +206,7 @@ static mhe_status rk_implicit(struct rk_context *c, const double *r, double h, i
         if (i == RK_LAST_ROUNDS) {
             return mhe_fail(err, MHE_RETRY, "no stages found for a step of %g s", h);
         }
-        status = rk_iterate(c, r, h, 1, &change, err);
+        status = rk_iterate(c, r, h, RK_JACOBIAN_ALL, &change, err);
     }
     return status;
 }
@@ -216,7 +223,7 @@ static mhe_status rk_explicit(struct rk_context *c, const double *r, double h, i
         }
         memcpy(c->K + j * n_q, c->f + j * n_q, sizeof(double) * (size_t)n_q);
     }
-    return derivatives ? rk_factor(c, h, 1, err) : MHE_OK;
+    return derivatives ? rk_factor(c, h, -1, err) : MHE_OK;
 }
 
 mhe_status rk_mechanics(struct rk_context *c, const double *r, double h, int32_t derivatives,

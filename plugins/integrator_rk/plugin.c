@@ -5,9 +5,9 @@
 static const mhe_option rk_options[] = {
     MHE_OPT_ENUM(struct rk_config, scheme, "gauss", "gauss|rk4",
                  "Gauss-Legendre collocation (implicit), or the classical explicit scheme."),
-    MHE_OPT_INT(struct rk_config, stages, 3, 1, RK_MAX_STAGES, "1",
+    MHE_OPT_INT(struct rk_config, stages, 4, 1, RK_MAX_STAGES, "1",
                 "Stages of the Gauss scheme; its order is twice that."),
-    MHE_OPT_REAL(struct rk_config, max_step, 0.03, 1e-6, 10, "s",
+    MHE_OPT_REAL(struct rk_config, max_step, 0.015, 1e-6, 10, "s",
                  "An interval is cut into equal steps no longer than this."),
     MHE_OPT_REAL(struct rk_config, newton_tolerance, 1e-10, 1e-14, 1e-3, "1",
                  "Error left in the stage velocities, relative to 1 + |qdot|."),

@@ -8,7 +8,7 @@
 
 /* Steps of the activations are at most this many of their shortest time constants long: the 4-stage
  * scheme is then off by less than 1e-6 of e - a. */
-#define RK_ACTIVATION_STEP 1.25
+#define RK_ACTIVATION_STEP 1.7
 /* An interval whose steps have no solution is tried again with steps of half the length, this
  * often. */
 #define RK_HALVINGS 3
@@ -51,7 +51,7 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
     }
     rk->system = system;
     rk->config = *(const struct rk_config *)config;
-    rk_tableau_gauss(RK_MAX_STAGES, &rk->activation);
+    rk_tableau_gauss(RK_ACTIVATION_STAGES, &rk->activation);
     if (rk->config.scheme == RK_RK4) {
         rk_tableau_rk4(&rk->mechanics);
     } else {
@@ -95,10 +95,12 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                   {&c->stage_a, s * n_m},
                   {&c->stage_a_a, s * n_m},
                   {&c->stage_a_e, s * n_m},
-                  {&c->slope, RK_MAX_STAGES * n_m},
-                  {&c->slope_a, RK_MAX_STAGES * n_m},
-                  {&c->slope_e, RK_MAX_STAGES * n_m},
-                  {&c->guess, RK_MAX_STAGES * n_m},
+                  {&c->slope, RK_ACTIVATION_STAGES * n_m},
+                  {&c->slope_a, RK_ACTIVATION_STAGES * n_m},
+                  {&c->slope_e, RK_ACTIVATION_STAGES * n_m},
+                  {&c->guess, RK_ACTIVATION_STAGES * n_m},
+                  {&c->guess_a, RK_ACTIVATION_STAGES * n_m},
+                  {&c->guess_e, RK_ACTIVATION_STAGES * n_m},
                   {&c->q, n_q},
                   {&c->v, n_q},
                   {&c->K, s * n_q},

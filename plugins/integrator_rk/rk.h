@@ -2,9 +2,9 @@
 /* rk.h: fixed-step Runge-Kutta schemes on the musculoskeletal shape of mhe/integrator.h.
  *
  * A step of length h is split by structure. Activations are scalar equations that see neither q nor
- * v: they are carried first, by collocation on steps of their own, from one stage time of the
- * mechanical step to the next (activation.c). What remains, q'' = f(q, v, a(t), r), is solved for
- * the stage accelerations K_j alone (mechanics.c): v_j = v + h sum_k A_jk K_k,   q_j = q + h c_j v
+ * v: they are carried first, by collocation on steps of their own (activation.c). What remains, q''
+ * = f(q, v, a(t), r), is solved for the stage accelerations K_j alone (mechanics.c): v_j = v + h
+ * sum_k A_jk K_k,   q_j = q + h c_j v
  * + h^2 sum_k (A A)_jk K_k,   K_j = f(q_j, v_j, a_j, r) v+ = v + h sum_j b_j K_j,     q+ = q + h v
  * + h^2 sum_j (b A)_j K_j */
 #ifndef INTEGRATOR_RK_H
@@ -12,7 +12,8 @@
 
 #include <mhe/integrator.h>
 
-#define RK_MAX_STAGES 4
+#define RK_MAX_STAGES 6
+#define RK_ACTIVATION_STAGES 4
 #define RK_GAUSS 0
 #define RK_RK4 1
 
@@ -29,13 +30,14 @@ struct rk_config {
 struct rk_tableau {
     int32_t stages;
     int32_t is_explicit;
+    int32_t terms; /* of the polynomial that stands for an activation over a step */
     double c[RK_MAX_STAGES], b[RK_MAX_STAGES];
     double A[RK_MAX_STAGES * RK_MAX_STAGES];
     double AA[RK_MAX_STAGES * RK_MAX_STAGES]; /* A A */
     double bA[RK_MAX_STAGES];                 /* b A */
 };
 
-void rk_tableau_gauss(int32_t stages, struct rk_tableau *out); /* 1..4 */
+void rk_tableau_gauss(int32_t stages, struct rk_tableau *out); /* 1..RK_MAX_STAGES */
 void rk_tableau_rk4(struct rk_tableau *out);
 
 struct rk {
@@ -55,10 +57,10 @@ struct rk_context {
     /* activations */
     double *a, *a_a, *a_e;             /* [n_m] value now; its derivatives by start and control */
     double *a_start;                   /* [n_m] at the start of the mechanical step */
-    double *stage_a;                   /* [s x n_m] at the stage times of the mechanical step */
+    double *stage_a;                   /* [s x n_m] as the stages of the mechanical step see them */
     double *stage_a_a, *stage_a_e;     /* [s x n_m] */
     double *slope, *slope_a, *slope_e; /* [4 x n_m] stage slopes of an activation step */
-    double *guess;                     /* [4 x n_m] */
+    double *guess, *guess_a, *guess_e; /* [4 x n_m] stage values of an activation step */
 
     /* mechanics */
     double *q, *v;                 /* [n_q] */

@@ -3,7 +3,8 @@
 #include "rk.h"
 
 #include <math.h>
-#include <string.h>
+
+#define RK_PI 3.14159265358979323846
 
 static void rk_tableau_finish(struct rk_tableau *t) {
     int32_t s = t->stages;
@@ -30,34 +31,28 @@ static double rk_lagrange(const double *c, int32_t n, int32_t k, double x) {
     return value;
 }
 
-/* Upper halves of the Gauss-Legendre nodes and weights on [-1, 1]. */
+/* Nodes and weights of the Gauss-Legendre rule on [0, 1]: roots z of P_n, by Newton, and
+ * 2 / ((1 - z^2) P_n'(z)^2) halved. */
 static void rk_gauss_rule(int32_t n, double *c, double *b) {
-    double x[RK_MAX_STAGES] = {0}, w[RK_MAX_STAGES] = {0};
-    switch (n) {
-    case 1:
-        w[0] = 2;
-        break;
-    case 2:
-        x[1] = sqrt(1.0 / 3), w[1] = 1;
-        break;
-    case 3:
-        w[1] = 8.0 / 9;
-        x[2] = sqrt(0.6), w[2] = 5.0 / 9;
-        break;
-    default:
-        x[2] = sqrt(3.0 / 7 - 2.0 / 7 * sqrt(1.2)), w[2] = (18 + sqrt(30)) / 36;
-        x[3] = sqrt(3.0 / 7 + 2.0 / 7 * sqrt(1.2)), w[3] = (18 - sqrt(30)) / 36;
-        break;
-    }
     for (int32_t i = 0; i < n; i++) {
-        int32_t half = i >= n - 1 - i ? i : n - 1 - i;
-        c[i] = 0.5 + 0.5 * (i == half ? x[half] : -x[half]);
-        b[i] = 0.5 * w[half];
+        double z = -cos(RK_PI * (i + 0.75) / (n + 0.5)), slope = 0;
+        for (int32_t iteration = 0; iteration < 8; iteration++) {
+            double p = 1, previous = 0;
+            for (int32_t d = 1; d <= n; d++) {
+                double next = ((2 * d - 1) * z * p - (d - 1) * previous) / d;
+                previous = p;
+                p = next;
+            }
+            slope = n * (z * p - previous) / (z * z - 1);
+            z -= p / slope;
+        }
+        c[i] = 0.5 + 0.5 * z;
+        b[i] = 1 / ((1 - z * z) * slope * slope);
     }
 }
 
 void rk_tableau_gauss(int32_t stages, struct rk_tableau *out) {
-    *out = (struct rk_tableau){.stages = stages};
+    *out = (struct rk_tableau){.stages = stages, .terms = stages};
     rk_gauss_rule(stages, out->c, out->b);
     /* A_jk is the integral of the k-th Lagrange polynomial from 0 to c_j; the rule itself is exact
      * for it. */
@@ -76,6 +71,7 @@ void rk_tableau_gauss(int32_t stages, struct rk_tableau *out) {
 void rk_tableau_rk4(struct rk_tableau *out) {
     *out = (struct rk_tableau){.stages = 4,
                                .is_explicit = 1,
+                               .terms = 3, /* integrated exactly by Simpson's rule */
                                .c = {0, 0.5, 0.5, 1},
                                .b = {1.0 / 6, 1.0 / 3, 1.0 / 3, 1.0 / 6}};
     out->A[1 * 4 + 0] = 0.5;

@@ -28,7 +28,9 @@ struct hill_shape hill_three_bells(const double b[3][4], double n) {
 
 struct hill_shape hill_log_velocity(const double d[4], double s) {
     double y = d[1] * s + d[2];
-    return (struct hill_shape){d[0] * asinh(y) + d[3], d[0] * d[1] / sqrt(y * y + 1)};
+    double root = sqrt(y * y + 1);
+    double arsinh = copysign(log(fabs(y) + root), y); /* half the time of asinh() */
+    return (struct hill_shape){d[0] * arsinh + d[3], d[0] * d[1] / root};
 }
 
 struct hill_shape hill_hyperbola(double s) {

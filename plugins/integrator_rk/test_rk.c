@@ -1,0 +1,289 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe.integrator.rk on closed-form systems: derivatives, order, linear systems, energy, CVODES. */
+#include "systems.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define RK "mhe.integrator.rk"
+#define N_FLAGS 4 /* all combinations of SYSTEM_EXCITATION and SYSTEM_RESIDUALS */
+
+static const char *const schemes[] = {"stages: 1",
+                                      "stages: 2",
+                                      "stages: 3",
+                                      "stages: 4",
+                                      "{scheme: rk4, max_step: 0.008}",
+                                      "{stages: 2, max_step: 0.007}"};
+#define N_SCHEMES (sizeof schemes / sizeof schemes[0])
+
+static void random_state(uint64_t *seed, const mhe_system *system, double *x, double *u) {
+    for (int32_t i = 0; i < system->n_x; i++) {
+        x[i] = i < 4 ? test_random(seed, -1.2, 1.2) * (i < 2 ? 1 : 4) : test_random(seed, 0, 1);
+    }
+    for (int32_t i = 0; i < system->n_u; i++) {
+        u[i] = i < SYSTEM_M ? test_random(seed, 0, 1) : test_random(seed, -3, 3);
+    }
+}
+
+static void derivatives(void **state) {
+    (void)state;
+    uint64_t seed = 5;
+    double worst = 0;
+    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+        mhe_system system;
+        test_pendulum_system(flags, &system);
+        for (size_t k = 0; k < N_SCHEMES; k++) {
+            struct test_integrator rk = test_integrator_open(RK, schemes[k], &system, NULL);
+            for (int trial = 0; trial < 10; trial++) {
+                double x[SYSTEM_X], u[SYSTEM_U];
+                random_state(&seed, &system, x, u);
+                double error = test_step_derivatives(&rk, x, u, test_random(&seed, 0.01, 0.05));
+                assert_true(error >= 0);
+                worst = fmax(worst, error);
+            }
+            test_integrator_close(&rk);
+        }
+    }
+    print_message("A, B against differences: %.1e\n", worst);
+    assert_true(worst < 1e-6);
+}
+
+/* The step with derivatives ends where the step without them does. */
+static void same_step_with_derivatives(void **state) {
+    (void)state;
+    uint64_t seed = 6;
+    mhe_system system;
+    test_pendulum_system(SYSTEM_EXCITATION, &system);
+    struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
+    double worst = 0;
+    for (int trial = 0; trial < 50; trial++) {
+        double x[SYSTEM_X], u[SYSTEM_U], plain[SYSTEM_X], full[SYSTEM_X];
+        double A[SYSTEM_X * SYSTEM_X], B[SYSTEM_X * SYSTEM_U];
+        random_state(&seed, &system, x, u);
+        test_integrate(&rk, x, u, 0.03, plain, NULL, NULL);
+        test_integrate(&rk, x, u, 0.03, full, A, B);
+        worst = fmax(worst, test_relative(plain, full, system.n_x));
+    }
+    print_message("with and without derivatives: %.1e\n", worst);
+    assert_true(worst < 1e-9);
+    test_integrator_close(&rk);
+}
+
+/* Mean error of (q, v) after 80 ms over some random states. */
+static double mean_error(const mhe_system *system, const char *scheme, double max_step) {
+    char yaml[96];
+    (void)snprintf(yaml, sizeof yaml, "{%s, max_step: %g, newton_tolerance: 1e-13}", scheme,
+                   max_step);
+    struct test_integrator rk = test_integrator_open(RK, yaml, system, NULL);
+    struct test_integrator fine =
+        test_integrator_open(RK, "{stages: 6, max_step: 0.004}", system, NULL);
+    uint64_t seed = 8;
+    double sum = 0;
+    for (int trial = 0; trial < 10; trial++) {
+        double x[SYSTEM_X], u[SYSTEM_U], next[SYSTEM_X], exact[SYSTEM_X];
+        random_state(&seed, system, x, u);
+        test_integrate(&rk, x, u, 0.08, next, NULL, NULL);
+        test_integrate(&fine, x, u, 0.08, exact, NULL, NULL);
+        sum += test_relative(next, exact, 4);
+    }
+    test_integrator_close(&rk);
+    test_integrator_close(&fine);
+    return sum / 10;
+}
+
+/* Halving the step divides the error by 2^order, until it is rounding. With constant activations:
+ * their transients are over in a step of this length. */
+static void order(void **state) {
+    (void)state;
+    const struct {
+        const char *scheme;
+        double step;
+        int order;
+    } cases[] = {{"stages: 1", 0.02, 2}, {"stages: 2", 0.02, 4},  {"stages: 3", 0.02, 6},
+                 {"stages: 4", 0.02, 8}, {"stages: 5", 0.04, 10}, {"scheme: rk4", 0.01, 4}};
+    mhe_system system;
+    test_pendulum_system(SYSTEM_RESIDUALS, &system);
+    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+        double whole = mean_error(&system, cases[k].scheme, cases[k].step);
+        double half = mean_error(&system, cases[k].scheme, cases[k].step / 2);
+        double seen = log2(whole / half);
+        print_message("%s: errors %.1e %.1e, order %.2f\n", cases[k].scheme, whole, half, seen);
+        assert_true(fabs(seen - cases[k].order) < 0.5);
+    }
+}
+
+/* out [n x n] = exp(a): Taylor series of a / 2^8, squared 8 times. */
+static void exponential(const double *a, int n, double *out) {
+    double term[144], sum[144], product[144];
+    assert_true(n * n <= 144);
+    for (int i = 0; i < n * n; i++) {
+        term[i] = sum[i] = i % (n + 1) == 0;
+    }
+    for (int k = 1; k < 8; k++) {
+        memset(product, 0, sizeof product);
+        for (int i = 0; i < n; i++) {
+            for (int j = 0; j < n; j++) {
+                for (int m = 0; m < n; m++) {
+                    product[i * n + j] += term[i * n + m] * a[m * n + j] * 0x1p-8 / k;
+                }
+            }
+        }
+        memcpy(term, product, sizeof term);
+        for (int i = 0; i < n * n; i++) {
+            sum[i] += term[i];
+        }
+    }
+    for (int squaring = 0; squaring < 8; squaring++) {
+        memset(product, 0, sizeof product);
+        for (int i = 0; i < n; i++) {
+            for (int j = 0; j < n; j++) {
+                for (int m = 0; m < n; m++) {
+                    product[i * n + j] += sum[i * n + m] * sum[m * n + j];
+                }
+            }
+        }
+        memcpy(sum, product, sizeof sum);
+    }
+    memcpy(out, sum, sizeof(double) * (size_t)(n * n));
+}
+
+/* A and B are blocks of the exponential of [[J, J_u], [0, 0]] dt. */
+static void linear_system(void **state) {
+    (void)state;
+    uint64_t seed = 9;
+    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+        mhe_system system;
+        test_linear_system(flags, &system);
+        int32_t n_x = system.n_x, n_u = system.n_u, n = n_x + n_u;
+        double rate[144] = {0}, flow[144], x[SYSTEM_X], u[SYSTEM_U], next[SYSTEM_X];
+        double A[SYSTEM_X * SYSTEM_X], B[SYSTEM_X * SYSTEM_U], worst = 0;
+        const double dt = 0.03;
+        test_linear_matrix(&system, rate);
+        for (int i = 0; i < n_x * n; i++) {
+            rate[i] *= dt;
+        }
+        exponential(rate, n, flow);
+        random_state(&seed, &system, x, u);
+        struct test_integrator rk = test_integrator_open(RK, "stages: 4", &system, NULL);
+        test_integrate(&rk, x, u, dt, next, A, B);
+        for (int32_t i = 0; i < n_x; i++) {
+            double expected = 0;
+            for (int32_t j = 0; j < n; j++) {
+                double value = j < n_x ? A[i * n_x + j] : B[i * n_u + j - n_x];
+                expected += flow[i * n + j] * (j < n_x ? x[j] : u[j - n_x]);
+                worst = fmax(worst, fabs(value - flow[i * n + j]));
+            }
+            worst = fmax(worst, fabs(next[i] - expected));
+        }
+        print_message("linear system %d against the exponential: %.1e\n", flags, worst);
+        assert_true(worst < 1e-6);
+        test_integrator_close(&rk);
+    }
+}
+
+/* Without muscles the pendulum keeps its energy; a symplectic scheme does not drift. */
+static void energy(void **state) {
+    (void)state;
+    mhe_system system;
+    test_pendulum_system(0, &system);
+    struct test_integrator rk = test_integrator_open(RK, "max_step: 0.01", &system, NULL);
+    double x[4] = {0.3, 0.9, 2, -1}, u[SYSTEM_M] = {0, 0, 0}, start, middle = 0, end = 0;
+    start = test_pendulum_energy(x, x + 2);
+    for (int k = 0; k < 4000; k++) {
+        test_integrate(&rk, x, u, 0.01, x, NULL, NULL);
+        double off = fabs(test_pendulum_energy(x, x + 2) - start);
+        *(k < 2000 ? &middle : &end) = fmax(k < 2000 ? middle : end, off);
+    }
+    print_message("energy over 40 s: off by %.1e in the first half, %.1e in the second\n", middle,
+                  end);
+    assert_true(end < 1e-7);
+    assert_true(end < 3 * middle);
+    test_integrator_close(&rk);
+}
+
+static void against_cvodes(void **state) {
+    (void)state;
+    uint64_t seed = 10;
+    double worst = 0, worst_derivative = 0;
+    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+        mhe_system system;
+        test_pendulum_system(flags, &system);
+        struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
+        struct test_integrator reference = test_integrator_open(
+            "mhe.integrator.sundials", "{rtol: 1e-10, atol: 1e-12}", &system, NULL);
+        if (reference.ops == NULL) {
+            test_integrator_close(&rk);
+            skip();
+        }
+        for (int trial = 0; trial < 30; trial++) {
+            double x[SYSTEM_X], u[SYSTEM_U], next[2][SYSTEM_X];
+            double A[2][SYSTEM_X * SYSTEM_X], B[2][SYSTEM_X * SYSTEM_U];
+            random_state(&seed, &system, x, u);
+            double dt = test_random(&seed, 0.01, 0.06);
+            test_integrate(&rk, x, u, dt, next[0], A[0], B[0]);
+            test_integrate(&reference, x, u, dt, next[1], A[1], B[1]);
+            worst = fmax(worst, test_relative(next[0], next[1], system.n_x));
+            worst_derivative =
+                fmax(worst_derivative, test_relative(A[0], A[1], system.n_x * system.n_x));
+            worst_derivative =
+                fmax(worst_derivative, test_relative(B[0], B[1], system.n_x * system.n_u));
+        }
+        test_integrator_close(&rk);
+        test_integrator_close(&reference);
+    }
+    print_message("against CVODES (1e-10): state %.1e, A and B %.1e\n", worst, worst_derivative);
+    assert_true(worst < 1e-5);
+    assert_true(worst_derivative < 1e-3);
+}
+
+/* ---- a system that answers badly ---- */
+
+static mhe_system inner;
+
+static mhe_status domain_acceleration(const mhe_system *system, void *context, const double *q,
+                                      const double *v, const double *a, const double *r,
+                                      const mhe_acceleration *out, mhe_error *err) {
+    (void)system;
+    if (q[0] > 100) {
+        return mhe_fail(err, MHE_E_NUMERIC, "stop");
+    }
+    if (q[0] > 10) {
+        return mhe_fail(err, MHE_RETRY, "outside");
+    }
+    return inner.acceleration(&inner, context, q, v, a, r, out, err);
+}
+
+static void bad_points(void **state) {
+    (void)state;
+    test_pendulum_system(SYSTEM_EXCITATION, &inner);
+    mhe_system system = inner;
+    system.acceleration = domain_acceleration;
+    struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
+    double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
+    mhe_error err = {0};
+    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, next, NULL, NULL, &err), MHE_RETRY);
+    assert_string_equal(err.text, "outside");
+    x[0] = 101;
+    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, next, NULL, NULL, &err), MHE_E_NUMERIC);
+    const double bad[] = {NAN, INFINITY};
+    for (int i = 0; i < SYSTEM_X; i++) {
+        for (int k = 0; k < 2; k++) {
+            double y[SYSTEM_X] = {0, 0, 0, 0, 0.5, 0.5, 0.5};
+            y[i] = bad[k];
+            assert_true(rk.ops->step(rk.context, y, u, 0.03, next, NULL, NULL, &err) != MHE_OK);
+        }
+    }
+    x[0] = 0; /* and it goes on */
+    test_integrate(&rk, x, u, 0.03, next, NULL, NULL);
+    test_integrator_close(&rk);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(derivatives), cmocka_unit_test(same_step_with_derivatives),
+        cmocka_unit_test(order),       cmocka_unit_test(linear_system),
+        cmocka_unit_test(energy),      cmocka_unit_test(against_cvodes),
+        cmocka_unit_test(bad_points)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}

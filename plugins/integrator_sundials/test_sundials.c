@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe.integrator.sundials on closed-form systems: derivatives, tolerances, failures. */
+#include "systems.h"
+
+#include <math.h>
+#include <string.h>
+
+#define SUNDIALS "mhe.integrator.sundials"
+#define N_FLAGS 4 /* all combinations of SYSTEM_EXCITATION and SYSTEM_RESIDUALS */
+
+static void random_state(uint64_t *seed, const mhe_system *system, double *x, double *u) {
+    for (int32_t i = 0; i < system->n_x; i++) {
+        x[i] = i < 4 ? test_random(seed, -1.2, 1.2) * (i < 2 ? 1 : 4) : test_random(seed, 0, 1);
+    }
+    for (int32_t i = 0; i < system->n_u; i++) {
+        u[i] = i < SYSTEM_M ? test_random(seed, 0, 1) : test_random(seed, -3, 3);
+    }
+}
+
+/* The sensitivities are CVODES' own solution, not the derivative of its steps: they agree with
+ * differences as far as the tolerances go. */
+static void derivatives(void **state) {
+    (void)state;
+    uint64_t seed = 21;
+    double worst = 0;
+    const char *const configs[] = {"{rtol: 1e-10, atol: 1e-12}",
+                                   "{rtol: 1e-10, atol: 1e-12, method: adams}"};
+    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+        mhe_system system;
+        test_pendulum_system(flags, &system);
+        for (int k = 0; k < 2; k++) {
+            struct test_integrator flow = test_integrator_open(SUNDIALS, configs[k], &system, NULL);
+            for (int trial = 0; trial < 5; trial++) {
+                double x[SYSTEM_X], u[SYSTEM_U];
+                random_state(&seed, &system, x, u);
+                double error = test_step_derivatives(&flow, x, u, 0.03);
+                assert_true(error >= 0);
+                worst = fmax(worst, error);
+            }
+            test_integrator_close(&flow);
+        }
+    }
+    print_message("A, B against differences: %.1e\n", worst);
+    assert_true(worst < 1e-6);
+}
+
+/* adot = (e - a) / tau has a closed solution. */
+static void tolerance_holds(void **state) {
+    (void)state;
+    const double tau[SYSTEM_M] = {0.009, 0.018, 0.05};
+    mhe_system system;
+    test_linear_system(SYSTEM_EXCITATION, &system);
+    struct test_integrator flow =
+        test_integrator_open(SUNDIALS, "{rtol: 1e-10, atol: 1e-12}", &system, NULL);
+    double x[SYSTEM_X] = {0, 0, 0, 0, 0.1, 0.9, 0.5}, u[SYSTEM_M] = {1, 0, 0.2}, next[SYSTEM_X];
+    double A[SYSTEM_X * SYSTEM_X], B[SYSTEM_X * SYSTEM_U];
+    test_integrate(&flow, x, u, 0.06, next, A, B);
+    for (int i = 0; i < SYSTEM_M; i++) {
+        double decay = exp(-0.06 / tau[i]);
+        assert_true(fabs(next[4 + i] - (u[i] + (x[4 + i] - u[i]) * decay)) < 1e-9);
+        assert_true(fabs(A[(4 + i) * 7 + 4 + i] - decay) < 1e-9);
+        assert_true(fabs(B[(4 + i) * 3 + i] - (1 - decay)) < 1e-9);
+    }
+    test_integrator_close(&flow);
+}
+
+static void same_bits_twice(void **state) {
+    (void)state;
+    uint64_t seed = 22;
+    mhe_system system;
+    test_pendulum_system(SYSTEM_EXCITATION, &system);
+    struct test_integrator flow = test_integrator_open(SUNDIALS, "", &system, NULL);
+    double x[SYSTEM_X], u[SYSTEM_U], other[SYSTEM_X], next[2][SYSTEM_X];
+    double A[SYSTEM_X * SYSTEM_X], B[SYSTEM_X * SYSTEM_U];
+    random_state(&seed, &system, x, u);
+    random_state(&seed, &system, other, u);
+    test_integrate(&flow, x, u, 0.03, next[0], A, B);
+    test_integrate(&flow, other, u, 0.05, next[1], NULL, NULL);
+    test_integrate(&flow, x, u, 0.03, next[1], A, B);
+    assert_memory_equal(next[0], next[1], sizeof next[0]);
+    test_integrator_close(&flow);
+}
+
+/* ---- a system that answers badly ---- */
+
+static mhe_system inner;
+
+static mhe_status domain_acceleration(const mhe_system *system, void *context, const double *q,
+                                      const double *v, const double *a, const double *r,
+                                      const mhe_acceleration *out, mhe_error *err) {
+    (void)system;
+    if (q[0] > 100) {
+        return mhe_fail(err, MHE_E_NUMERIC, "stop");
+    }
+    if (q[0] > 10) {
+        return mhe_fail(err, MHE_RETRY, "outside");
+    }
+    return inner.acceleration(&inner, context, q, v, a, r, out, err);
+}
+
+static void failures(void **state) {
+    (void)state;
+    test_pendulum_system(SYSTEM_EXCITATION, &inner);
+    mhe_system system = inner;
+    system.acceleration = domain_acceleration;
+    struct test_integrator flow = test_integrator_open(SUNDIALS, "", &system, NULL);
+    double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
+    mhe_error err = {0};
+    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, next, NULL, NULL, &err), MHE_RETRY);
+    assert_string_equal(err.text, "outside");
+    x[0] = 101;
+    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, next, NULL, NULL, &err),
+                     MHE_E_NUMERIC);
+    assert_string_equal(err.text, "stop");
+    x[0] = NAN;
+    assert_true(flow.ops->step(flow.context, x, u, 0.03, next, NULL, NULL, &err) != MHE_OK);
+    x[0] = 0; /* and it goes on */
+    test_integrate(&flow, x, u, 0.03, next, NULL, NULL);
+    test_integrator_close(&flow);
+    flow = test_integrator_open(SUNDIALS, "max_steps: 3", &system, NULL);
+    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, next, NULL, NULL, &err), MHE_RETRY);
+    assert_non_null(strstr(err.text, "CVODES"));
+    test_integrator_close(&flow);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(derivatives), cmocka_unit_test(tolerance_holds),
+        cmocka_unit_test(same_bits_twice), cmocka_unit_test(failures)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
