@@ -11,6 +11,11 @@
 #define FIRST_WEIGHT 100.0 /* of the proximal term on velocities and activations */
 #define FIRST_MOVE 0.02    /* 1, rad/s: so near to its centre the term no longer matters */
 
+/* An unfinished iterate is handed out only if it is a motion of the model: largest jump between
+ * intervals that may remain, rad, rad/s, 1. Else its states would start the next window and the
+ * error would stay. */
+#define CONSISTENT 1e-2
+
 static void *row(double *array, int32_t k, int32_t width) {
     return array + (ptrdiff_t)k * width;
 }
@@ -236,7 +241,7 @@ static mhe_status solve_first(mhe_estimator *e, mhe_solve_info *info, mhe_error 
 mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
                             mhe_error *err) {
     const mhe_status status = (e->solved == 0 ? solve_first : solve_once)(e, info, err);
-    const int usable = status == MHE_OK &&
+    const int usable = status == MHE_OK && info->primal_residual <= CONSISTENT &&
                        all_finite(e->solution.x, (ptrdiff_t)(e->n + 1) * e->n_x) &&
                        all_finite(e->solution.u, (ptrdiff_t)e->n * e->n_u);
     if (usable && info->outcome == MHE_SOLVE_CONVERGED) {
