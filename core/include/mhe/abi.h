@@ -71,6 +71,11 @@ static inline mhe_status mhe_fail(mhe_error *err, mhe_status code, const char *f
         err->code = code;
         (void)vsnprintf(err->text, sizeof err->text, format, args);
         va_end(args);
+        for (char *c = err->text; *c != '\0'; c++) { /* one line, whatever a file put into it */
+            if ((unsigned char)*c < ' ') {
+                *c = ' ';
+            }
+        }
     }
     return code;
 }
