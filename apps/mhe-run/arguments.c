@@ -16,9 +16,9 @@ const char arguments_help[] =
     "  mhe-run --describe ID [--json | --markdown]\n"
     "  mhe-run --version | --help\n"
     "\n"
-    "Results go to DIR, ./out/<config name> unless given. Exit status: 0 done; 1 the run failed or "
-    "was\n"
-    "interrupted; 2 the command line, the configuration or an input file is wrong.\n";
+    "--describe config shows every key of the config file. Results go to DIR, ./out/<config name>\n"
+    "unless given. Exit status: 0 done; 1 the run failed or was interrupted; 2 the command line, the\n"
+    "configuration or an input file is wrong.\n";
 
 static const char *const words[] = {"--out",          "--set",  "--quiet",    "--check",
                                     "--list-plugins", "--json", "--markdown", "--describe",

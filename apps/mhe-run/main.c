@@ -7,11 +7,16 @@
 #include <mhe/version.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 static mhe_status show_plugins(const arguments *a, mhi_registry *registry, mhe_error *err) {
     mhi_text text = {0};
     if (a->mode == MODE_LIST) {
         mhi_registry_list(registry, a->format, &text);
+        return console_print(&text, err);
+    }
+    if (strcmp(a->id, "config") == 0) {
+        mhi_run_describe(a->format, &text);
         return console_print(&text, err);
     }
     mhe_status status = mhi_registry_describe(registry, a->id, a->format, &text, err);

@@ -92,6 +92,9 @@ const mhi_section *mhi_run_sections(int32_t *n);
 /* Option table of a section; NULL if there is none of that name. [any] */
 const mhe_option *mhi_run_section(const char *section, int32_t *n);
 
+/* All sections and their keys in a format of registry.h. */
+void mhi_run_describe(int32_t format, mhi_text *out);
+
 /* Reads and checks a config with `set` [n_set] assignments applied. Finds every plugin it names in
  * `registry` (the file's plugin_path is searched first, if given). MHE_E_CONFIG, MHE_E_INPUT,
  * MHE_E_PLUGIN: one line, "file:line: ...". Files of the data section are not opened. [cold] */
