@@ -19,7 +19,7 @@ static const mhe_plugin flow_plugin = {
     .version = "0.1.0",
     .summary =
         "CVODES with forward sensitivities from exact Jacobians: the reference for the other "
-        "integrators",
+        "integrators.",
     .reference = "doi:10.1145/1089014.1089020",
     .iface = MHE_INTEGRATOR_IFACE,
     .ops = &flow_ops,

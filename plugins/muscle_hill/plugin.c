@@ -24,7 +24,7 @@ static const mhe_plugin hill_plugin = {
     .id = "mhe.muscle.hill",
     .version = "0.1.0",
     .summary = "Hill muscles with rigid tendons on one of four curve sets, with the smooth "
-               "activation dynamics of De Groote et al.",
+               "activation dynamics of De Groote et al. (2016).",
     .reference = "doi:10.1007/s10439-016-1591-9",
     .iface = MHE_MUSCLE_IFACE,
     .ops = &hill_ops,
