@@ -11,6 +11,7 @@ cp "$demo"/arm19.osim "$demo"/demo* "$work"
 cd "$work" || exit 1
 failed=0
 count=0
+want=2
 
 # expect NAME 'TEXT IN THE MESSAGE' [arguments of mhe-run, instead of demo.yaml]
 expect() {
@@ -24,7 +25,7 @@ expect() {
     message=$(grep -v 'warning:' stderr.txt)
     lines=$(printf '%s\n' "$message" | grep -c .)
     files=$(find result -type f 2>/dev/null | wc -l)
-    if [ "$status" -ne 2 ] || [ "$lines" -ne 1 ] || [ "$files" -ne 0 ]; then
+    if [ "$status" -ne $want ] || [ "$lines" -ne 1 ] || [ "$files" -ne 0 ]; then
         echo "FAILED $name: status $status, $lines lines, $files files written: $message"
         failed=$((failed + 1))
     elif ! printf '%s' "$message" | grep -qF -- "$text"; then
@@ -56,8 +57,8 @@ edit demo.yaml 's/tolerance: 1e-4/tolerence: 1e-4/'
 expect plugin-option "did you mean 'tolerance'"
 expect bad-set 'window' demo.yaml --set horizon.window=0
 expect set-unknown 'horizon' demo.yaml --set horzon.window=3
-edit demo.yaml 's/q: \[0, 0, 0, 0.2\]/q: [0, 0]/'
-expect initial-size 'initial.q has 2 values'
+edit demo.yaml 's/q: \[[^]]*\]/q: [0, 0]/'
+expect initial-size 'has 2 values'
 printf 'model: [unclosed\n' > demo.yaml
 expect not-yaml 'demo.yaml:'
 
@@ -67,14 +68,14 @@ printf '<OpenSimDocument><Model>' > arm19.osim
 expect broken-model 'arm19.osim:1'
 edit arm19.osim '0,/<mass>[0-9.]*</s//<mass>-1</'
 expect negative-mass 'mass'
-edit arm19.osim 's#<socket_parent_frame>/bodyset/humerus</socket_parent_frame>#<socket_parent_frame>/bodyset/humrus</socket_parent_frame>#'
-expect unknown-body 'humrus'
+edit arm19.osim '0,/<PathPoint/!s#/bodyset/LowerArm1<#/bodyset/LoweArm1<#'
+expect unknown-body "did you mean 'LowerArm1'"
 
 rm demo_markers.trc
 expect missing-markers 'demo_markers.trc'
 edit demo_markers.trc 's/DELT/DELTT/'
 expect typing-slip "did you mean 'DELT'"
-edit demo_markers.trc '4s/[A-Za-z_]\{4,\}/&_zzzzzzzz/g;4s/Frame#_zzzzzzzz/Frame#/;4s/Time_zzzzzzzz/Time/'
+edit demo_markers.trc '4s/\t\([A-Z][A-Za-z_]*\)/\t\1zzzzzzzzzzzz/g;4s/Timezzzzzzzzzzzz/Time/'
 expect no-marker-matches 'no column is a marker'
 edit demo_markers.trc '3s/mm/m/'
 expect wrong-unit 'within a metre'
@@ -99,8 +100,9 @@ edit demo_emg.sto 's/endheader/endhead/'
 expect no-endheader 'demo_emg.sto'
 head -c 4000 /dev/urandom > demo_emg.sto
 expect random-bytes 'demo_emg.sto'
-edit demo_reference.sto 's/q_/p_/g'
+edit demo_reference.sto 's/q_Arm_RotX/q_Leg/'
 expect reference-columns 'demo_reference.sto'
+want=1
 expect output-is-a-file 'stdout.txt' demo.yaml --out stdout.txt/x
 
 echo "$((count - failed)) passed, $failed failed"

@@ -59,7 +59,8 @@ static void quantities_before_the_name(void **state) {
     assert_int_equal(find(labels, "F.BRA"), 4);
     assert_int_equal(find(labels, "e_BRA"), 3);
     assert_int_equal(find(labels, "BRA"), -1); /* activation, excitation or force? */
-    assert_int_equal(find("e.BRA\te.BRD", "BRD"), 1);
+    assert_int_equal(find("e.BRA\te.BRD", "BRD"), -1);
+    assert_int_equal(find("qdot_elbow", "elbow"), -1); /* a speed never passes for a position */
     assert_int_equal(find("time2\tq", "q"), 1);
 }
 

@@ -91,10 +91,7 @@ static int32_t score(const char *column, const char *name, const label *wanted) 
     if (found.quantity == wanted->quantity) {
         return 3;
     }
-    if (wanted->quantity == QUANTITY_NONE) {
-        return found.quantity == QUANTITY_Q ? 2 : 1;
-    }
-    return 0;
+    return wanted->quantity == QUANTITY_NONE && found.quantity == QUANTITY_Q ? 2 : 0;
 }
 
 int32_t mhi_table_find(const mhi_table *table, const char *name) {

@@ -42,7 +42,7 @@ void mhi_table_free(mhi_table *table);
  *   of the same quantity written in another way. A label may state one: q, qdot, a, e or F before
  *     '.' or '_' ("a.BRA", "F_BRA"), or OpenSim's value, speed, activation, excitation or
  *     tendon_force behind the path ("/jointset/elbow/elbow_flexion/value");
- *   where `name` states no quantity: its q, else the only column about it.
+ *   where `name` states no quantity: its q.
  * Two columns that fit equally well are none. [any] */
 int32_t mhi_table_find(const mhi_table *table, const char *name);
 
