@@ -7,7 +7,6 @@
 #include "results.h"
 #include "summary.h"
 
-#include <math.h>
 #include <signal.h>
 #include <string.h>
 
@@ -28,20 +27,6 @@ typedef struct tracking {
     summary summary;
 } tracking;
 
-/* The first state from the reference, where the config gives none and the reference knows it. */
-static void start_from_reference(tracking *t) {
-    const mhi_reference *r = &t->recording->reference;
-    if (!r->present) {
-        return;
-    }
-    for (int32_t i = 0; i < t->summary.info.n_q; i++) {
-        if (isnan(r->q[i]) || isnan(r->qdot[i])) {
-            return;
-        }
-    }
-    mhi_estimator_set_start(t->estimator, r->q, r->qdot);
-}
-
 static mhe_status open_all(tracking *t, mhe_error *err) {
     const track_setup *s = t->setup;
     mhe_status status = mhi_estimator_create(s->run, s->host, &t->estimator, err);
@@ -53,7 +38,8 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
     status =
         mhi_recording_read(s->run, mhi_system_description(system), s->host, &t->recording, err);
     if (status == MHE_OK && t->recording->reference.present) {
-        start_from_reference(t);
+        mhi_estimator_set_start(t->estimator, t->recording->reference.q,
+                                t->recording->reference.qdot);
         status = mhi_errors_create(system, t->recording, &t->errors, err);
     }
     if (status == MHE_OK && !s->check_only) {

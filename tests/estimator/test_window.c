@@ -129,9 +129,62 @@ static void markers_in_millimetres_are_refused(void **state) {
     test_fixture_close(&h.f);
 }
 
+/* A refused window used to keep its oldest frame, and the next one was written past the end. */
+static void after_a_refusal_frames_go_on(void **state) {
+    (void)state;
+    held h;
+    open_held(&h);
+    mhe_estimate e = {0};
+    double far[3 * N_K];
+    int32_t n_refused = 0, n_ready = 0;
+    for (int32_t i = 0; i < 3 * N_K; i++) {
+        far[i] = 1000 * h.markers[i];
+    }
+    for (int32_t k = 0; k < 60; k++) {
+        int32_t ready = 0;
+        n_refused += push(&h, 0.01 * k, k < 30 ? far : h.markers, &e, &ready) == MHE_E_INPUT;
+        n_ready += ready;
+    }
+    assert_int_equal(n_refused, 10); /* every second frame from the 11th to the 29th */
+    assert_int_equal(n_ready, 15);
+    for (int32_t i = 0; i < N_Q; i++) {
+        assert_true(fabs(e.q[i] - posture[i]) < 0.05);
+    }
+    test_fixture_close(&h.f);
+}
+
+/* A known posture says nothing of its velocity. */
+static void start_without_velocity_is_free_to_move(void **state) {
+    (void)state;
+    test_fixture f;
+    const double speed = 1.0;
+    double q[N_Q] = {-0.1, -0.3, -0.1, 0.4}, markers[3 * N_K];
+    if (test_fixture_open(&f, "model: {file: $ARM19}\nmuscle: {curves: paper2021}\n"
+                              "horizon: {window: 5, ratio: 1}\n"
+                              "initial: {q: [-0.1, -0.3, -0.1, 0.4]}\n"
+                              "costs: [mhe.cost.min-excitation]\n") != MHE_OK) {
+        fail_msg("%s", f.err.text);
+    }
+    mhe_estimate e = {0};
+    int32_t ready = 0;
+    for (int32_t k = 0; k <= 5; k++) {
+        const mhe_frame frame = {.size = sizeof frame, .time = 0.01 * k, .markers = markers};
+        q[3] = posture[3] + speed * frame.time;
+        assert_int_equal(mhi_system_markers(mhi_ocp_context(f.ocp), q, markers, NULL, NULL),
+                         MHE_OK);
+        assert_int_equal(mhe_estimator_push(f.estimator, &frame, &e, &ready, &f.err), MHE_OK);
+    }
+    assert_true(ready);
+    assert_true(fabs(e.qdot[3] - speed) < 0.2);
+    test_fixture_close(&f);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(estimates_belong_to_the_oldest_frame), cmocka_unit_test(gaps_are_bridged),
-        cmocka_unit_test(time_must_increase), cmocka_unit_test(markers_in_millimetres_are_refused)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(estimates_belong_to_the_oldest_frame),
+                                       cmocka_unit_test(gaps_are_bridged),
+                                       cmocka_unit_test(time_must_increase),
+                                       cmocka_unit_test(markers_in_millimetres_are_refused),
+                                       cmocka_unit_test(after_a_refusal_frames_go_on),
+                                       cmocka_unit_test(start_without_velocity_is_free_to_move)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -14,8 +14,8 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
                                 mhe_error *err);
 const mhi_system *mhi_estimator_system(const mhe_estimator *estimator);
 mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
-/* First state from outside the config (a reference); q, qdot [n_q], before the first push. What the
- * config itself gives is kept. */
+/* First state from outside the config (a reference), before the first push: q, qdot [n_q], NaN (or
+ * NULL) where it is not known. What the config itself gives is kept. */
 void mhi_estimator_set_start(mhe_estimator *estimator, const double *q, const double *qdot);
 /* The state the next window starts from, instead of what the last solution expects: x [n_x]. After
  * a push that was `ready`. */

@@ -117,7 +117,8 @@ mhe_status mhi_errors_add(mhi_errors *e, const mhe_estimate *s, mhe_error *err) 
     const double *force = r->force + (ptrdiff_t)k * e->n_m;
     mhe_status status = MHE_OK;
     mhi_muscle_state muscles;
-    if (any_nan(force, e->n_m) && !any_nan(v, e->n_q) && !any_nan(a, e->n_m)) {
+    const int known = !any_nan(q, e->n_q); /* a reference may end before the markers do */
+    if (known && any_nan(force, e->n_m) && !any_nan(v, e->n_q) && !any_nan(a, e->n_m)) {
         status = mhi_system_muscles(e->context, q, v, a, 0, &muscles, err);
         force = muscles.force;
     }
@@ -127,10 +128,12 @@ mhe_status mhi_errors_add(mhi_errors *e, const mhe_estimate *s, mhe_error *err) 
     compare(e, EXCITATION, s->excitation, r->excitation + (ptrdiff_t)k * e->n_m, row);
     if (status == MHE_OK) {
         compare(e, FORCE, s->force, force, row);
+    }
+    if (status == MHE_OK && known) {
         status = mhi_system_markers(e->context, q, e->marker, NULL, err);
     }
     for (int32_t i = 0; i < e->n_k && status == MHE_OK; i++) {
-        double squares = 0;
+        double squares = known ? 0 : NAN;
         for (int32_t axis = 0; axis < 3; axis++) {
             const double d = s->markers[3 * i + axis] - e->marker[3 * i + axis];
             squares += d * d;

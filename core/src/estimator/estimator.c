@@ -69,8 +69,8 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
                                .n_workers = 1};
     status = mhi_ocp_create(&ocp, &e->ocp, err);
     if (status == MHE_OK) {
-        status = e->solver->create(e->host, mhi_ocp_face(e->ocp), run->solver.config,
-                                   &e->solver_self, err);
+        status = mhi_solver_create(run->solver.plugin, e->host, mhi_ocp_face(e->ocp),
+                                   run->solver.config, &e->solver_self, err);
     }
     if (status == MHE_OK) {
         status = mhi_start_create(e->system, mhi_ocp_context(e->ocp), &e->start, err);
@@ -122,6 +122,9 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
     for (int32_t i = 0; i < e->n_m; i++) {
         e->no_emg[i] = NAN;
     }
+    for (int32_t i = 0; i < e->n_q; i++) {
+        e->start_q[i] = e->start_v[i] = NAN;
+    }
     e->solution.size = sizeof e->solution;
     e->last_time = -INFINITY;
     return MHE_OK;
@@ -137,10 +140,8 @@ static mhe_status start_from_config(mhe_estimator *e, mhe_error *err) {
                             e->run->path, i == 0 ? "q" : "qdot", given[i], e->n_q);
         }
     }
-    if (given[0] > 0) {
-        mhi_estimator_set_start(e, initial->q.values,
-                                given[1] > 0 ? initial->qdot.values : e->start_v);
-    }
+    mhi_estimator_set_start(e, given[0] > 0 ? initial->q.values : NULL,
+                            given[1] > 0 ? initial->qdot.values : NULL);
     return MHE_OK;
 }
 
@@ -240,12 +241,10 @@ mhi_ocp *mhi_estimator_ocp(mhe_estimator *e) {
 }
 
 void mhi_estimator_set_start(mhe_estimator *e, const double *q, const double *qdot) {
-    if (e->start_known) {
-        return;
+    for (int32_t i = 0; i < e->n_q; i++) {
+        e->start_q[i] = isnan(e->start_q[i]) && q != NULL ? q[i] : e->start_q[i];
+        e->start_v[i] = isnan(e->start_v[i]) && qdot != NULL ? qdot[i] : e->start_v[i];
     }
-    memcpy(e->start_q, q, sizeof(double) * (size_t)e->n_q);
-    memmove(e->start_v, qdot, sizeof(double) * (size_t)e->n_q);
-    e->start_known = 1;
 }
 
 void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
@@ -353,10 +352,10 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     if (status == MHE_OK) {
         status = give_estimate(e, estimate, err);
     }
+    mhi_window_advance(e); /* in any case: the next frame needs its place */
     if (status != MHE_OK) {
         return status;
     }
-    mhi_window_advance(e);
     estimate->iterations = info.iterations;
     estimate->kkt_residual = info.kkt_residual;
     estimate->solve_time = now() - begin;

@@ -38,8 +38,7 @@ struct mhe_estimator {
     mhe_solution solution;
     double *guess_x, *guess_u;           /* what the last solve started from */
     double *prior_centre, *prior_weight; /* [n_x], of the first window's proximal term */
-    double *start_q, *start_v;           /* known first state, NaN where free */
-    int32_t start_known;
+    double *start_q, *start_v;           /* known first state [n_q], NaN where free */
 
     double *no_markers, *no_emg; /* all missing */
 

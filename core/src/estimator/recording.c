@@ -196,12 +196,13 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     if (status == MHE_OK && run->data.reference != NULL) {
         status = read_reference(r, run, d, host, err);
     }
-    if (status == MHE_OK && r->n_frames <= run->horizon.window * run->horizon.ratio) {
+    const int64_t span = (int64_t)run->horizon.window * run->horizon.ratio;
+    if (status == MHE_OK && r->n_frames <= span) {
         status = mhe_fail(
             err, MHE_E_INPUT,
-            "%s: %d frames are too few for a window of %d intervals at ratio %d, which needs %d",
+            "%s: %d frames are too few for a window of %d intervals at ratio %d, which needs %lld",
             run->data.markers != NULL ? run->data.markers : run->data.emg, r->n_frames,
-            run->horizon.window, run->horizon.ratio, run->horizon.window * run->horizon.ratio + 1);
+            run->horizon.window, run->horizon.ratio, (long long)span + 1);
     }
     if (status != MHE_OK) {
         mhi_recording_free(r);

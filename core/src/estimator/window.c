@@ -65,10 +65,13 @@ static void set_bounds(mhe_estimator *e) {
 static void bound_first_state(mhe_estimator *e) {
     double *lower = mhi_ocp_x_lower(e->ocp, 0), *upper = mhi_ocp_x_upper(e->ocp, 0);
     const double width = e->run->initial.tolerance;
-    for (int32_t i = 0; i < e->n_q && e->start_known; i++) {
+    for (int32_t i = 0; i < e->n_q; i++) {
         const double known[2] = {e->start_q[i], e->start_v[i]};
         for (int32_t part = 0; part < 2; part++) {
             const int32_t j = part * e->n_q + i;
+            if (isnan(known[part])) {
+                continue;
+            }
             const double centre = clip(known[part], lower[j], upper[j]);
             lower[j] = fmax(lower[j], centre - width);
             upper[j] = fmin(upper[j], centre + width);
@@ -112,7 +115,7 @@ static mhe_status guess_first_window(mhe_estimator *e, mhe_error *err) {
     double *q = e->out_q; /* free as scratch before the first estimate */
     int32_t n_seen = 0;
     for (int32_t i = 0; i < e->n_q; i++) {
-        q[i] = e->start_known ? e->start_q[i] : e->description->coordinates[i].value;
+        q[i] = isnan(e->start_q[i]) ? e->description->coordinates[i].value : e->start_q[i];
     }
     for (int32_t k = 0; k <= e->n; k++) {
         mhe_status status = (n_seen == 0 ? mhi_start_search : mhi_start_posture)(
