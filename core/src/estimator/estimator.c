@@ -36,6 +36,28 @@ static mhe_status read_model(mhe_estimator *e, mhe_error *err) {
     return MHE_OK;
 }
 
+/* A plugin refuses to be created with a message that begins with its id: puts the line of the
+ * config before it. Two costs with one id cannot be told apart; the file alone is named then. */
+static mhe_status locate(const mhi_run *run, mhe_status status, mhe_error *err) {
+    const mhi_use *const parts[] = {&run->model, &run->muscle, &run->integrator, &run->solver};
+    const int32_t n_parts = (int32_t)(sizeof parts / sizeof parts[0]);
+    const mhi_node *node = NULL;
+    int32_t n_found = 0;
+    for (int32_t i = 0; i < n_parts + run->n_costs && err != NULL; i++) {
+        const mhi_use *use = i < n_parts ? parts[i] : &run->costs[i - n_parts];
+        const size_t length = strlen(use->plugin->id);
+        if (strncmp(err->text, use->plugin->id, length) == 0 && err->text[length] == ':') {
+            node = use->node;
+            n_found++;
+        }
+    }
+    if (n_found == 0) {
+        return status;
+    }
+    const mhe_error why = *err;
+    return mhi_fail_at(err, status, run->tree, n_found == 1 ? node : NULL, "%s", why.text);
+}
+
 static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     const mhi_run *run = e->run;
     const mhi_system_setup system = {.host = e->host,
@@ -135,9 +157,10 @@ static mhe_status start_from_config(mhe_estimator *e, mhe_error *err) {
     const int32_t given[2] = {initial->q.n, initial->qdot.n};
     for (int32_t i = 0; i < 2; i++) {
         if (given[i] != 0 && given[i] != e->n_q) {
-            return mhe_fail(err, MHE_E_CONFIG,
-                            "%s: initial.%s has %d values; the model has %d coordinates",
-                            e->run->path, i == 0 ? "q" : "qdot", given[i], e->n_q);
+            const mhi_node *node = mhi_node_find(mhi_tree_root(e->run->tree), "initial");
+            return mhi_fail_at(err, MHE_E_CONFIG, e->run->tree, node,
+                               "initial.%s has %d values; the model has %d coordinates",
+                               i == 0 ? "q" : "qdot", given[i], e->n_q);
         }
     }
     mhi_estimator_set_start(e, given[0] > 0 ? initial->q.values : NULL,
@@ -160,6 +183,7 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
     mhe_status status = read_model(e, err);
     if (status == MHE_OK) {
         status = create_problem(e, err);
+        status = status == MHE_OK ? MHE_OK : locate(run, status, err);
     }
     if (status == MHE_OK) {
         const mhe_system *f = mhi_system_face(e->system);

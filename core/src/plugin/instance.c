@@ -19,7 +19,7 @@ static mhe_status guarded(mhe_status (*function)(void *), const mhe_plugin *plug
     *c->self = NULL;
     c->ops = plugin->ops;
     mhe_status status = mhi_guard(function, c, c->err);
-    if (status == MHE_E_PLUGIN && c->err != NULL) {
+    if (status != MHE_OK && c->err != NULL) {
         const mhe_error why = *c->err;
         return mhe_fail(c->err, status, "%s: %.600s", plugin->id, why.text);
     }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* instance.h: creates instances of plugins; an exception that a plugin throws becomes MHE_E_PLUGIN.
- */
+ * Messages of a failure begin with "<plugin id>: ". */
 #ifndef MHI_INSTANCE_H
 #define MHI_INSTANCE_H
 
