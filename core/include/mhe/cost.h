@@ -5,14 +5,17 @@
  * core owns the chain rule from signals to states and controls, the sum over nodes and the options
  * common to all costs:
  *
- *     objective = sum over nodes k of  c_k * weight / sigma^2 * 1/2 |r_k|^2,   c_k = interval
- * length (s), last node 1
+ *     objective = sum over nodes k of  c_k * weight / sigma^2 * 1/2 |r_k|^2
+ *     c_k = interval length (s), at the last node 1
  *
- * Signals (unit; what a target of the same name is compared with):
- *   markers (m)  positions in ground [3 n_markers]      activation (1)   excitation (1,
- * excitation-driven only) q, qdot (rad, rad/s or m, m/s)                      muscle_force (N)
- *   joint_moment (N m) by the muscles, -L_q^T F [n_q]   residual_torque (N m, only when switched
- * on) [n_q]
+ * Signals, with size and unit; a problem that lacks one has no signal of that name:
+ *   markers          [3 n_markers]  m, positions in ground
+ *   q, qdot          [n_q]          rad, rad/s (m, m/s of sliders)
+ *   activation       [n_muscles]    1
+ *   excitation       [n_muscles]    1; excitation-driven only
+ *   muscle_force     [n_muscles]    N, along the tendon
+ *   joint_moment     [n_q]          N m (N), by the muscles: -L_q^T F
+ *   residual_torque  [n_q]          N m (N); only where switched on
  *
  * Missing data: a missing sample is NaN in `y_ref`; a signal that has no value at a node (controls
  * at the last node) is NaN in `y`. A residual must let NaN through; the core then drops its row and
@@ -40,7 +43,7 @@ struct mhe_problem {
     int32_t n_q, n_muscles, n_markers;
     int32_t n_residual_torques; /* 0 or n_q */
     int32_t n_intervals;
-    double interval; /* s */
+    double interval; /* s; before the first frames a guess: see mhe_stage.time instead */
     const char *const *coordinate_names;
     const char *const *muscle_names;
     const char *const *marker_names;
@@ -52,9 +55,10 @@ struct mhe_problem {
                            const char **unit);
 };
 
-#define MHE_JACOBIAN_DENSE 0 /* J [n_res x ny], row-major */
-#define MHE_JACOBIAN_DIAGONAL \
-    1 /* n_res = ny and r_i depends on y_i alone: J [ny] is the diagonal */
+/* Shape of J: dense [n_res x ny], row-major; or, where n_res = ny and r_i depends on y_i alone, its
+ * diagonal [ny]. */
+#define MHE_JACOBIAN_DENSE 0
+#define MHE_JACOBIAN_DIAGONAL 1
 
 /* Filled by layout(); zeroed before. */
 typedef struct mhe_cost_layout {

@@ -34,7 +34,7 @@ typedef struct mhe_estimator_info {
     int32_t n_q, n_muscles, n_markers, n_residual_torques;
     int32_t window;  /* intervals N */
     int32_t ratio;   /* every ratio-th frame is used */
-    double interval; /* s between nodes */
+    double interval; /* s between nodes; known from the first full window on */
     const char *const *coordinate_names;
     const char *const *muscle_names;
     const char *const *marker_names;
@@ -54,9 +54,8 @@ typedef struct mhe_frame {
 #define MHE_FRAME_OK 0              /* the solve converged */
 #define MHE_FRAME_ITERATION_LIMIT 1 /* the best iterate after max_iterations */
 #define MHE_FRAME_DEADLINE 2        /* the best iterate at the deadline */
-#define MHE_FRAME_PREDICTED \
-    3 /* the solve failed: the model's prediction from the last good state */
-#define MHE_FRAME_RESTARTED 4 /* first solve after a restart of the window */
+#define MHE_FRAME_PREDICTED 3       /* the solve failed: the model's prediction */
+#define MHE_FRAME_RESTARTED 4       /* first solve after a restart of the window */
 
 /* Arrays are the estimator's own and valid until its next call; never NaN. */
 typedef struct mhe_estimate {
@@ -83,14 +82,16 @@ typedef struct mhe_estimate {
  * what. [cold] */
 mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
                               const mhe_host *host, mhe_estimator **estimator, mhe_error *err);
-void mhe_estimator_close(mhe_estimator *estimator);
+void mhe_estimator_close(mhe_estimator *estimator); /* NULL is fine. [cold] */
 
+/* Fills `info`. [cold] */
 void mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
 
 /* Takes the next frame (time must increase). `*ready` is 1 when `estimate` was filled: from the
  * window's first fill on, at every ratio-th frame. A bad frame or a failed solve is told by
- * estimate->status; a negative status of the function means misuse (time not increasing) or a bug.
- */
+ * estimate->status. MHE_E_ARGUMENT: time does not increase; the frame is not taken. MHE_E_INPUT: no
+ * marker of the first window is within a metre of the model; the window moves on and the next frame
+ * is tried. Anything else is a bug. [cold] */
 mhe_status mhe_estimator_push(mhe_estimator *estimator, const mhe_frame *frame,
                               mhe_estimate *estimate, int32_t *ready, mhe_error *err);
 

@@ -1,15 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* integrator.h: interface of integrator plugins (kind "integrator").
  *
- * An integrator carries the state over one shooting interval with constant controls, x_next = F(x,
- * u), and gives the exact derivatives of what it computed (of the discrete map, not an
- * approximation of the flow's).
+ * An integrator carries the state over one shooting interval with constant controls,
+ * x_next = F(x, u), and gives the exact derivatives of what it computed (of the discrete map, not
+ * an approximation of the flow's).
  *
  * The system is musculoskeletal in shape and integrators may use that:
  *   excitation-driven  x = [q (n_q), v (n_q), a (n_m)]   u = [e (n_m), r (n_r)]
  *   activation-driven  x = [q (n_q), v (n_q)]            u = [a (n_m), r (n_r)]
- *   qdot = v,  vdot = f(q, v, a, r),  adot_i = g_i(e_i, a_i): each activation is a scalar equation
- * of its own. r are residual joint torques (n_r = 0 or n_q). */
+ *   qdot = v,  vdot = f(q, v, a, r),  adot_i = g_i(e_i, a_i)
+ *
+ * Each activation is a scalar equation of its own. r are residual joint torques (n_r = 0 or n_q).
+ */
 #ifndef MHE_INTEGRATOR_H
 #define MHE_INTEGRATOR_H
 
@@ -35,8 +37,7 @@ typedef struct mhe_system mhe_system;
 struct mhe_system {
     uint32_t size;
     int32_t n_q, n_m, n_r;
-    int32_t
-        n_a; /* activations among the states: n_m (excitation-driven) or 0 (activation-driven) */
+    int32_t n_a;      /* activations among the states: n_m (excitation-driven), else 0 */
     int32_t n_x, n_u; /* 2 n_q + n_a, n_m + n_r */
     void *data;       /* the core's own */
     /* vdot = f(q, v, a, r). `context` is the thread's own system context. `r` may be NULL when n_r

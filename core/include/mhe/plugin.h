@@ -9,8 +9,9 @@
  * Thread tags used in all headers:
  *   [cold]  never two calls at once on one instance
  *   [hot]   `self` is const and shared by threads; writes only to outputs, contexts and scratch
- * that belong to one thread; does not allocate, lock, print or touch files [any]   safe anywhere,
- * any time */
+ *           that belong to one thread; does not allocate, lock, print or touch files
+ *   [any]   safe anywhere, any time
+ */
 #ifndef MHE_PLUGIN_H
 #define MHE_PLUGIN_H
 

@@ -3,13 +3,15 @@
  *
  * A solver sees a stage-structured least-squares problem and knows no muscles:
  *
- *     minimise   sum_{k=0}^{N-1} l_k(x_k, u_k) + l_N(x_N)        (each l_k half a weighted sum of
- * squares) subject to x_{k+1} = F_k(x_k, u_k),   x_lower_k <= x_k <= x_upper_k,   u_lower_k <= u_k
- * <= u_upper_k
+ *     minimise    sum_{k=0}^{N-1} l_k(x_k, u_k) + l_N(x_N)
+ *     subject to  x_{k+1} = F_k(x_k, u_k)
+ *                 x_lower_k <= x_k <= x_upper_k,   u_lower_k <= u_k <= u_upper_k
  *
- * A variable is fixed where its bounds are equal (the first state of a moving horizon). Lagrangian
- * and signs: L = sum l_k + sum_k lambda_k^T (x_{k+1} - F_k(x_k, u_k)) - z_lower^T (w - lower) -
- * z_upper^T (upper - w),  z >= 0
+ * Each l_k is half a weighted sum of squares. A variable is fixed where its bounds are equal (the
+ * first state of a moving horizon). Lagrangian and signs, with w all x and u:
+ *
+ *     L = sum_k l_k + sum_k lambda_k^T (x_{k+1} - F_k(x_k, u_k))
+ *         - z_lower^T (w - lower) - z_upper^T (upper - w),   z >= 0
  */
 #ifndef MHE_SOLVER_H
 #define MHE_SOLVER_H
@@ -33,7 +35,7 @@ typedef struct mhe_stage_values {
     double *hess_ux; /* [n_u x n_x] */
     double *hess_uu; /* [n_u x n_u] */
     double *x_next;  /* [n_x] F_k(x_k, u_k) */
-    double *A;       /* dF/dx [n_x x n_x] */
+    double *A;       /* dF/dx [n_x x n_x]; A and B both or neither, and only with x_next */
     double *B;       /* dF/du [n_x x n_u] */
 } mhe_stage_values;
 
@@ -88,8 +90,7 @@ typedef struct mhe_solve_info {
     int32_t outcome; /* MHE_SOLVE_*: a result, not an error */
     int32_t iterations;
     double objective;
-    double
-        kkt_residual; /* largest violation of the optimality conditions as the solver scales them */
+    double kkt_residual;    /* largest violation of the optimality conditions, in its own scaling */
     double primal_residual; /* largest |x_{k+1} - F_k| */
     double evaluation_time; /* s spent in evaluate() */
 } mhe_solve_info;
