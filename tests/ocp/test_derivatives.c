@@ -121,6 +121,31 @@ static void check_pattern(const uint8_t *pattern, const double *matrix, int32_t 
     }
 }
 
+/* What is asked for alone is what is given with everything else. */
+static void check_parts(const point *p, const values *all) {
+    const int32_t n_x = p->problem->n_x, n_u = p->problem->n_u;
+    const int last = p->k == p->problem->n_intervals;
+    const double *u = last ? NULL : p->z + n_x;
+    values v = take_values(n_x, n_u);
+    const mhe_stage_values parts[] = {
+        {.size = sizeof *parts, .grad_x = v.grad}, {.size = sizeof *parts, .grad_u = v.grad + n_x},
+        {.size = sizeof *parts, .hess_xx = v.xx},  {.size = sizeof *parts, .hess_ux = v.ux},
+        {.size = sizeof *parts, .hess_uu = v.uu},  {.size = sizeof *parts, .x_next = v.x_next}};
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
+        assert_int_equal(p->problem->evaluate(p->problem, 0, p->k, p->z, u, &parts[i], NULL),
+                         MHE_OK);
+    }
+    const size_t x = (size_t)n_x, w = (size_t)n_u, d = sizeof(double);
+    assert_memory_equal(v.grad, all->grad, d * (x + w));
+    assert_memory_equal(v.xx, all->xx, d * x * x);
+    assert_memory_equal(v.ux, all->ux, d * w * x);
+    assert_memory_equal(v.uu, all->uu, d * w * w);
+    for (size_t i = 0; i < x; i++) { /* an iterative step ends elsewhere where it needs no A, B */
+        assert_true(fabs(v.x_next[i] - all->x_next[i]) <= 1e-9 * fmax(1, fabs(v.x_next[i])));
+    }
+    free_values(&v);
+}
+
 static void check_node(test_fixture *f, int32_t k, uint64_t *seed) {
     const mhe_stage_problem *p = mhi_ocp_face(f->ocp);
     const int32_t n_x = p->n_x, n_u = p->n_u;
@@ -130,6 +155,7 @@ static void check_node(test_fixture *f, int32_t k, uint64_t *seed) {
     values v = take_values(n_x, n_u);
     random_point(f, seed, z);
     linearise(&at, &v);
+    check_parts(&at, &v);
     double error = test_jacobian_error(cost_value, &at, z, last ? n_x : n_x + n_u, 1, v.grad);
     assert_true(error >= 0 && error < TOLERANCE);
     check_pattern(p->xx_pattern, v.xx, n_x * n_x);

@@ -30,26 +30,40 @@ static int all_finite(const double *values, int32_t n) {
     return sum == 0;
 }
 
-/* The lower triangle of the z Hessian, given out as full blocks xx, ux, uu. */
+/* Full square block [n x n] from the lower triangle of rows of length n_z. */
+static void mirror(const double *lower, int32_t n_z, int32_t n, double *block) {
+    for (int32_t i = 0; i < n; i++) {
+        for (int32_t j = 0; j <= i; j++) {
+            block[i * n + j] = block[j * n + i] = lower[i * n_z + j];
+        }
+    }
+}
+
+/* The gradient and the lower triangle of the Hessian by z, given out as what is wanted of grad_x,
+ * grad_u, xx, ux, uu. */
 static void spread(const mhi_ocp_worker *w, int32_t n_x, int32_t n_u, const mhe_stage_values *out) {
     const int32_t n_z = n_x + n_u;
-    memcpy(out->grad_x, w->gradient, sizeof(double) * (size_t)n_x);
-    for (int32_t i = 0; i < n_x; i++) {
-        for (int32_t j = 0; j <= i; j++) {
-            out->hess_xx[i * n_x + j] = out->hess_xx[j * n_x + i] = w->hessian[i * n_z + j];
-        }
+    const double *of_u = w->hessian + n_x * n_z;
+    if (out->grad_x != NULL) {
+        memcpy(out->grad_x, w->gradient, sizeof(double) * (size_t)n_x);
     }
-    if (n_u == 0) {
-        return;
+    if (out->hess_xx != NULL) {
+        mirror(w->hessian, n_z, n_x, out->hess_xx);
     }
-    memcpy(out->grad_u, w->gradient + n_x, sizeof(double) * (size_t)n_u);
-    for (int32_t i = 0; i < n_u; i++) {
-        const double *row = w->hessian + (n_x + i) * n_z;
-        memcpy(out->hess_ux + i * n_x, row, sizeof(double) * (size_t)n_x);
-        for (int32_t j = 0; j <= i; j++) {
-            out->hess_uu[i * n_u + j] = out->hess_uu[j * n_u + i] = row[n_x + j];
-        }
+    if (out->grad_u != NULL && n_u > 0) {
+        memcpy(out->grad_u, w->gradient + n_x, sizeof(double) * (size_t)n_u);
     }
+    for (int32_t i = 0; i < n_u && out->hess_ux != NULL; i++) {
+        memcpy(out->hess_ux + i * n_x, of_u + i * n_z, sizeof(double) * (size_t)n_x);
+    }
+    if (out->hess_uu != NULL && n_u > 0) {
+        mirror(of_u + n_x, n_z, n_u, out->hess_uu);
+    }
+}
+
+static int wants_derivatives(const mhe_stage_values *out) {
+    return out->grad_x != NULL || out->grad_u != NULL || out->hess_xx != NULL ||
+           out->hess_ux != NULL || out->hess_uu != NULL;
 }
 
 static void add_prior(const mhi_ocp *ocp, const double *x, int32_t n_z, mhi_term_sum *sum) {
@@ -65,7 +79,7 @@ static void add_prior(const mhi_ocp *ocp, const double *x, int32_t n_z, mhi_term
 
 static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
                                 const double *u, const mhe_stage_values *out, mhe_error *err) {
-    const int derivatives = out->hess_xx != NULL;
+    const int derivatives = wants_derivatives(out);
     const int32_t n_x = ocp->face.n_x, n_u = u == NULL ? 0 : ocp->face.n_u, n_z = n_x + n_u;
     mhe_status status = mhi_signals_evaluate(&ocp->signals, ocp->system, w->system, ocp->wanted, x,
                                              u, w->y, derivatives ? w->jacobian : NULL, err);
@@ -95,6 +109,9 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     if (k == 0) {
         add_prior(ocp, x, n_z, &sum);
     }
+    if (derivatives && !all_finite(w->gradient, n_z)) {
+        return mhe_fail(err, MHE_RETRY, "a derivative of the costs is not finite");
+    }
     if (out->cost != NULL) {
         *out->cost = sum.cost;
     }
@@ -113,7 +130,7 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
         return mhe_fail(err, MHE_RETRY, "a state or control is not finite");
     }
     mhe_status status = MHE_OK;
-    if (out->cost != NULL || out->hess_xx != NULL) {
+    if (out->cost != NULL || wants_derivatives(out)) {
         status = evaluate_cost(ocp, w, k, x, u, out, err);
     }
     if (status == MHE_OK && u != NULL && out->x_next != NULL) {
