@@ -46,6 +46,11 @@ static int32_t count(const uint8_t *pattern, int32_t n) {
 
 mhe_status nlp_create(nlp *p, const mhe_stage_problem *problem, mhe_error *err) {
     int32_t N = problem->n_intervals, n_x = problem->n_x, n_u = problem->n_u;
+    if ((int64_t)(N + 1) * node_layout(problem).end > INT32_MAX) { /* Ipopt counts with int */
+        return mhe_fail(err, MHE_E_ARGUMENT,
+                        "%d intervals of %d states and %d controls are more than Ipopt can count",
+                        N, n_x, n_u);
+    }
     int32_t n_jacobian =
         N * (n_x + count(problem->A_pattern, n_x * n_x) + count(problem->B_pattern, n_x * n_u));
     int32_t n_hessian =

@@ -222,11 +222,32 @@ static void set_sizes(mhi_system *s, const mhi_system_setup *setup) {
                            .activation_rate = activation_rate};
 }
 
+/* Far above any body, and low enough for every size of a problem to be an int32_t. */
+#define MOST_COORDINATES 500
+#define MOST_MUSCLES 5000
+#define MOST_MARKERS 5000
+
+static mhe_status check_sizes(const mhe_description *d, mhe_error *err) {
+    if (d->n_coordinates == 0) {
+        return mhe_fail(err, MHE_E_INPUT, "%s: the model has no free coordinate", d->source);
+    }
+    if (d->n_coordinates > MOST_COORDINATES || d->n_muscles > MOST_MUSCLES ||
+        d->n_markers > MOST_MARKERS) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s: %d free coordinates, %d muscles, %d markers; at most %d, %d, %d are "
+                        "possible",
+                        d->source, d->n_coordinates, d->n_muscles, d->n_markers, MOST_COORDINATES,
+                        MOST_MUSCLES, MOST_MARKERS);
+    }
+    return MHE_OK;
+}
+
 mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system, mhe_error *err) {
     *system = NULL;
     const mhe_description *d = setup->description;
-    if (d->n_coordinates == 0) {
-        return mhe_fail(err, MHE_E_INPUT, "%s: the model has no free coordinate", d->source);
+    mhe_status sizes = check_sizes(d, err);
+    if (sizes != MHE_OK) {
+        return sizes;
     }
     mhi_arena arena = {0};
     mhi_system *s = MHI_TAKE(&arena, mhi_system, 1);
