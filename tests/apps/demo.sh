@@ -1,0 +1,72 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# The shipped demo from beginning to end: every file, sound figures, --set, --check, Ctrl-C, the same again.
+#   demo.sh BIN_DIR SOURCE_DIR
+set -u
+bin=$1
+demo=$2/models/arm19/demo.yaml
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failed=0
+
+fail() {
+    echo "FAILED $*"
+    failed=$((failed + 1))
+}
+
+# number KEY of summary.json, the first of that name
+number() { sed -n "s/.*\"$1\":[[:space:]]*\\([-0-9.e]*\\).*/\\1/p" "$2/summary.json" | head -n 1; }
+
+# holds 'EXPRESSION' for awk
+holds() { awk "BEGIN { exit !($1) }"; }
+
+"$bin/mhe-run" "$demo" --out result --quiet > out.txt 2> err.txt || fail "exit status $?: $(cat err.txt)"
+for file in estimates.sto forces.sto markers.trc torques.sto quality.sto config.yaml summary.json; do
+    [ -s "result/$file" ] || fail "no $file"
+done
+find result -name '.*' -type f | grep . && fail "temporary files are left"
+holds "$(number converged result) == 1" || fail "converged $(number converged result)"
+holds "$(number q_deg result) < 0.01" || fail "joint angles $(number q_deg result) deg"
+holds "$(number force_n result) < 2" || fail "forces $(number force_n result) N"
+holds "$(number marker_mm result) < 0.02" || fail "markers $(number marker_mm result) mm"
+holds "$(number peak_rss_mb result) < 200" || fail "memory $(number peak_rss_mb result) MB"
+[ "$(wc -l < result/forces.sto)" -eq "$(wc -l < result/torques.sto)" ] || fail "rows differ"
+
+# The resolved configuration is the same run.
+"$bin/mhe-run" result/config.yaml --out again --quiet > /dev/null 2>> err.txt || fail "config.yaml does not run"
+for file in estimates.sto forces.sto markers.trc torques.sto; do
+    cmp -s "result/$file" "again/$file" || fail "$file differs when run from config.yaml"
+done
+
+"$bin/mhe-run" --check "$demo" > check.txt 2>&1 || fail "--check: $(cat check.txt)"
+[ ! -e out ] || fail "--check wrote files"
+for set in formulation=activation costs.0=mhe.cost.min-excitation bounds.residual_torques=true; do
+    "$bin/mhe-run" "$demo" --out other --quiet --set "$set" --set horizon.ratio=6 \
+        --set horizon.window=3 > /dev/null 2> err.txt || fail "--set $set: $(cat err.txt)"
+done
+
+# Ctrl-C: the files are complete as far as they go, and the message says how far.
+timeout 100 "$bin/mhe-run" "$demo" --out cut --quiet --set horizon.ratio=1 --set horizon.window=22 > /dev/null 2> cut.txt &
+pid=$!
+sleep 1
+kill -INT $pid
+wait $pid
+status=$?
+if [ $status -eq 1 ]; then
+    grep -q interrupted cut.txt || fail "Ctrl-C: $(cat cut.txt)"
+    [ ! -d cut ] || find cut -name '.*' -type f | grep . && fail "Ctrl-C leaves temporary files"
+elif [ $status -ne 0 ]; then
+    fail "Ctrl-C: exit status $status"
+fi
+
+# The demo's motion is what mhe-sim makes of its postures.
+"$bin/mhe-sim" follow "$2/models/arm19/demo_motion.yaml" --input "$2/models/arm19/demo_postures.sto" \
+    --out motion > /dev/null || fail "mhe-sim follow"
+awk 'FNR == NR && FNR > 7 { q[FNR] = $2; next }
+     FNR > 7 { d = $2 - q[FNR]; if (d < 0) d = -d; if (d > worst) worst = d }
+     END { exit !(worst < 1e-2) }' motion/reference.sto "$2/models/arm19/demo_reference.sto" ||
+    fail "mhe-sim follow makes another motion"
+
+[ $failed -eq 0 ] && echo "demo: all as it should be"
+[ $failed -eq 0 ]
