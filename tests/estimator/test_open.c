@@ -36,6 +36,10 @@ static void refusals_name_the_line(void **state) {
                   "costs: [mhe.cost.min-excitation]\n"
                   "initial: {q: [0, 0]}\n",
                   MHE_E_CONFIG, "config.yaml:3: initial.q has 2 values");
+    check_refused("model: {file: $ARM19}\n"
+                  "costs: [mhe.cost.min-excitation]\n"
+                  "initial: {q: [0, 0, 0, 90]}\n", /* degrees */
+                  MHE_E_CONFIG, "config.yaml:3: initial.q: 90 of 'LowerArm1_RotZ' is outside");
 }
 
 static void one_id_twice_names_the_file(void **state) {

@@ -154,13 +154,22 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
 
 static mhe_status start_from_config(mhe_estimator *e, mhe_error *err) {
     const mhi_initial_section *initial = &e->run->initial;
+    const mhi_node *node = mhi_node_find(mhi_tree_root(e->run->tree), "initial");
     const int32_t given[2] = {initial->q.n, initial->qdot.n};
     for (int32_t i = 0; i < 2; i++) {
         if (given[i] != 0 && given[i] != e->n_q) {
-            const mhi_node *node = mhi_node_find(mhi_tree_root(e->run->tree), "initial");
             return mhi_fail_at(err, MHE_E_CONFIG, e->run->tree, node,
                                "initial.%s has %d values; the model has %d coordinates",
                                i == 0 ? "q" : "qdot", given[i], e->n_q);
+        }
+    }
+    for (int32_t i = 0; i < given[0]; i++) {
+        const mhe_coordinate *c = &e->description->coordinates[i];
+        const double q = initial->q.values[i];
+        if (q < c->lower - initial->tolerance || q > c->upper + initial->tolerance) {
+            return mhi_fail_at(err, MHE_E_CONFIG, e->run->tree, node,
+                               "initial.q: %g of '%s' is outside of its range, %g to %g", q,
+                               c->name, c->lower, c->upper);
         }
     }
     mhi_estimator_set_start(e, given[0] > 0 ? initial->q.values : NULL,
@@ -203,39 +212,6 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
         return status;
     }
     *estimator = e;
-    return MHE_OK;
-}
-
-static void silent(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text;
-}
-
-static const void *no_service(const mhe_host *host, const char *id) {
-    (void)host, (void)id;
-    return NULL;
-}
-
-mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
-                              const mhe_host *host, mhe_estimator **estimator, mhe_error *err) {
-    static const mhe_host quiet = {.size = sizeof quiet, .log = silent, .service = no_service};
-    host = host == NULL ? &quiet : host;
-    mhi_registry *registry = NULL;
-    mhi_run *run = NULL;
-    *estimator = NULL;
-    mhe_status status = mhi_registry_create(host, &registry, err);
-    if (status == MHE_OK) {
-        status = mhi_run_read(config, set, n_set, registry, &run, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_estimator_create(run, host, estimator, err);
-    }
-    if (status != MHE_OK) {
-        mhi_run_free(run);
-        mhi_registry_free(registry);
-        return status;
-    }
-    (*estimator)->registry = registry;
-    (*estimator)->owned_run = run;
     return MHE_OK;
 }
 

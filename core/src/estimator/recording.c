@@ -64,6 +64,39 @@ static void pass_on_warnings(const mhi_table *table, const mhe_host *host) {
     }
 }
 
+/* The estimator takes the first window's mean step for all. */
+static void warn_uneven(const mhi_recording *r, const char *path, const mhe_host *host) {
+    double least = INFINITY, most = 0;
+    for (int32_t k = 0; k + 1 < r->n_frames; k++) {
+        least = fmin(least, r->time[k + 1] - r->time[k]);
+        most = fmax(most, r->time[k + 1] - r->time[k]);
+    }
+    if (most > 1.5 * least) {
+        char line[512];
+        (void)snprintf(line, sizeof line,
+                       "%.400s: the times are uneven (steps of %.4g to %.4g s) but taken as even",
+                       path, least, most);
+        host->log(host, MHE_LOG_WARNING, line);
+    }
+}
+
+/* Raw or in percent; some way above 1 is common in fast motions. */
+static void warn_not_normalised(const mhi_recording *r, int32_t n_muscles, const char *path,
+                                const mhe_host *host) {
+    double least = 0, most = 0;
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * n_muscles; i++) {
+        least = fmin(least, r->emg[i]); /* of a number and NaN: the number */
+        most = fmax(most, r->emg[i]);
+    }
+    if (least < -0.05 || most > 2) {
+        char line[512];
+        (void)snprintf(line, sizeof line,
+                       "%.400s: values from %.4g to %.4g; EMG normalised to 0..1 is needed", path,
+                       least, most);
+        host->log(host, MHE_LOG_WARNING, line);
+    }
+}
+
 static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_description *d,
                                const mhe_host *host, mhe_error *err) {
     static const mhi_naming naming = {"marker", {"%s"}, 1};
@@ -105,6 +138,9 @@ static mhe_status read_emg(mhi_recording *r, const mhi_run *run, const mhe_descr
     if (status == MHE_OK) {
         status = read_quantity(r, table, &naming, names, d->n_muscles, 1, 0, &r->emg,
                                &r->n_emg_found, host, err);
+    }
+    if (status == MHE_OK) {
+        warn_not_normalised(r, d->n_muscles, table->path, host);
     }
     free(names);
     mhi_table_free(table);
@@ -195,6 +231,9 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     }
     if (status == MHE_OK && run->data.reference != NULL) {
         status = read_reference(r, run, d, host, err);
+    }
+    if (status == MHE_OK) {
+        warn_uneven(r, run->data.markers != NULL ? run->data.markers : run->data.emg, host);
     }
     const int64_t span = (int64_t)run->horizon.window * run->horizon.ratio;
     if (status == MHE_OK && r->n_frames <= span) {
