@@ -17,7 +17,8 @@ const char arguments_help[] =
     "  mhe-run --version | --help\n"
     "\n"
     "--describe config shows every key of the config file. Results go to DIR, ./out/<config name>\n"
-    "unless given. Exit status: 0 done; 1 the run failed or was interrupted; 2 the command line, the\n"
+    "unless given. Exit status: 0 done; 1 the run failed or was interrupted; 2 the command line, "
+    "the\n"
     "configuration or an input file is wrong.\n";
 
 static const char *const words[] = {"--out",          "--set",  "--quiet",    "--check",
@@ -26,7 +27,7 @@ static const char *const words[] = {"--out",          "--set",  "--quiet",    "-
 
 /* The word behind an option. */
 static mhe_status value_of(int argc, char **argv, int *i, const char **value, mhe_error *err) {
-    if (*i + 1 >= argc) {
+    if (*i + 1 >= argc || argv[*i + 1][0] == '\0') {
         return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", argv[*i]);
     }
     *value = argv[++*i];

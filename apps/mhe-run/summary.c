@@ -19,6 +19,7 @@ mhe_status summary_add(summary *s, const mhe_estimate *estimate, mhe_error *err)
     }
     s->solve_ms[s->n_solves++] = 1e3 * estimate->solve_time;
     s->n_converged += estimate->status == MHE_FRAME_OK;
+    s->n_deadline += estimate->status == MHE_FRAME_DEADLINE;
     s->iterations_sum += estimate->iterations;
     if (estimate->iterations > s->iterations_max) {
         s->iterations_max = estimate->iterations;
@@ -103,7 +104,7 @@ mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error
     cJSON *iterations = cJSON_AddObjectToObject(root, "iterations");
     add_number(iterations, "mean", s->n_solves == 0 ? NAN : s->iterations_sum / s->n_solves);
     add_number(iterations, "max", s->iterations_max);
-    add_number(root, "deadline_misses", 0);
+    add_number(root, "deadline_misses", s->n_deadline);
     add_number(root, "peak_rss_mb", peak_rss_mb());
     if (s->has_rmse) {
         add_rmse(root, &s->rmse);
@@ -125,7 +126,7 @@ void summary_lines(const summary *s, mhi_text *out) {
         mhi_text_add(out, "rate %.1f Hz mean; solve %.2f ms median, %.2f ms p99, %.2f ms max\n",
                      1e3 / mean_ms(s), percentile(s, 0.5), percentile(s, 0.99), percentile(s, 1));
     }
-    if (s->has_rmse) {
+    if (s->has_rmse && !isnan(s->rmse.q)) {
         const double degrees = 180 / acos(-1);
         mhi_text_add(
             out,

@@ -11,7 +11,7 @@ typedef struct summary {
     int32_t n_frames; /* of the recording */
     int32_t n_pushed;
     int32_t n_solves;
-    int32_t n_converged;
+    int32_t n_converged, n_deadline;
     int32_t iterations_max;
     double iterations_sum;
     double *solve_ms; /* [capacity >= n_solves], owned */

@@ -146,6 +146,10 @@ static mhe_status finish(tracking *t, mhe_error *err) {
         return status;
     }
     draw(t);
+    if (t->summary.n_converged == 0) {
+        t->setup->host->log(t->setup->host, MHE_LOG_WARNING,
+                            "no solve converged; quality.sto says how each ended");
+    }
     tell(t);
     if (interrupted) {
         return mhe_fail(
