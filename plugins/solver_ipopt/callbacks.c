@@ -80,8 +80,12 @@ static compat_bool eval_h(compat_index n, compat_number *v, compat_bool new_x,
     if (!nlp_evaluate(&s->nlp, v, NLP_ALL)) {
         return 0;
     }
+    if (s->config->adapt_curvature) {
+        curvature_adapt(&s->curvature, v);
+    }
+    const double factor = obj_factor * s->curvature.factor;
     for (compat_index i = 0; i < n_entries; i++) {
-        values[i] = obj_factor * s->nlp.store[s->nlp.hessian[i].at];
+        values[i] = factor * s->nlp.store[s->nlp.hessian[i].at];
     }
     return 1;
 }
@@ -93,8 +97,8 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
                                 void *data) {
     ipopt_solver *s = data;
     const mhe_solve_control *control = s->control;
-    (void)mode, (void)mu, (void)d_norm, (void)regularization, (void)alpha_du, (void)alpha_pr,
-        (void)trials;
+    (void)mode, (void)mu, (void)d_norm, (void)regularization, (void)alpha_du, (void)trials;
+    s->curvature.full_step = alpha_pr == 1;
     s->iterations = iteration;
     s->kkt_residual = fmax(inf_pr, inf_du);
     s->nlp.all_next = 1;

@@ -14,10 +14,23 @@ struct ipopt_config { /* filled from the option table of solver_ipopt.c */
     int32_t mu_strategy; /* position in "auto|adaptive|monotone" */
     double mu_init_warm;
     double objective_scale;
+    int32_t adapt_curvature;
     const char *linear_solver;
     int32_t print_level;
     mhe_text_map options;
 };
+
+/* Factor on the Gauss-Newton Hessian. It leaves out the curvature of the dynamics; where that is
+ * strong, full steps overshoot or creep along one direction, and the ratio of two successive steps
+ * tells the right factor for that direction. */
+typedef struct ipopt_curvature {
+    int32_t n;
+    double factor;
+    int32_t full_step;    /* the last step was taken in full */
+    int32_t n_steps;      /* full steps with one factor */
+    double *point, *step; /* [n] the last iterate and the step that led to it; NULL: not
+                             adapted */
+} ipopt_curvature;
 
 typedef struct ipopt_solver {
     const mhe_host *host;
@@ -29,6 +42,7 @@ typedef struct ipopt_solver {
      */
     double *v, *z_lower, *z_upper, *lambda, *work;
 
+    ipopt_curvature curvature;
     const mhe_solve_control *control; /* of the running solve */
     int32_t stopped;                  /* MHE_SOLVE_DEADLINE or _INTERRUPTED once asked to; else 0 */
     int32_t iterations;
@@ -38,6 +52,11 @@ typedef struct ipopt_solver {
 /* callbacks.c: an Ipopt problem for the current bounds of p, or NULL; user data is the
  * ipopt_solver. `lower`, `upper` [n] are overwritten, zero [m] holds zeros. */
 IpoptProblem ipopt_problem(const nlp *p, double *lower, double *upper, double *zero);
+
+/* curvature.c: forgets the last solve. */
+void curvature_begin(ipopt_curvature *c, int32_t n);
+/* Sets the factor for the step from point v [n]. */
+void curvature_adapt(ipopt_curvature *c, const double *v);
 
 /* settings.c: makes Ipopt silent and hands it all options that stay the same between solves.
  * MHE_E_CONFIG names an option that Ipopt does not take. */

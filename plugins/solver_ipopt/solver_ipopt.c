@@ -24,6 +24,9 @@ static const mhe_option ipopt_options[] = {
     MHE_OPT_REAL(struct ipopt_config, objective_scale, 0, 0, 1e12, "1",
                  "Factor on the objective inside Ipopt; 0: makes the mean curvature of the "
                  "controls 1 at the first start."),
+    MHE_OPT_BOOL(struct ipopt_config, adapt_curvature, 0,
+                 "Scale the Gauss-Newton Hessian where successive steps overshoot or creep; for "
+                 "long motions of strongly curved dynamics."),
     MHE_OPT_TEXT(struct ipopt_config, linear_solver, 0, "mumps", "Linear solver of Ipopt."),
     MHE_OPT_INT(struct ipopt_config, print_level, 0, 0, 12, "1",
                 "Amount of Ipopt's own console output; 0: none."),
@@ -40,6 +43,7 @@ static void ipopt_destroy(void *self) {
         FreeIpoptProblem(s->ipopt);
     }
     nlp_free(&s->nlp);
+    free(s->curvature.point);
     free(s->v);
     free(s);
 }
@@ -62,6 +66,12 @@ static mhe_status ipopt_create(const mhe_host *host, const mhe_stage_problem *pr
     if (s->v == NULL) {
         ipopt_destroy(s);
         return status != MHE_OK ? status : mhe_fail(err, MHE_E_MEMORY, "no memory for the solver");
+    }
+    s->curvature.factor = 1;
+    s->curvature.point = s->config->adapt_curvature ? calloc(2 * n, sizeof(double)) : NULL;
+    if (s->config->adapt_curvature && s->curvature.point == NULL) {
+        ipopt_destroy(s);
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for the solver");
     }
     s->z_lower = s->v + n;
     s->z_upper = s->z_lower + n;
@@ -244,6 +254,7 @@ static mhe_status ipopt_solve(void *self, const mhe_solve_control *control, mhe_
     s->control = control;
     s->stopped = s->iterations = 0;
     s->kkt_residual = INFINITY;
+    curvature_begin(&s->curvature, p->n);
     p->all_next = 1;
     int32_t verdict =
         (int32_t)IpoptSolve(s->ipopt, s->v, NULL, NULL, s->lambda, s->z_lower, s->z_upper, s);
