@@ -7,6 +7,7 @@
 #include "config/run_sections.h"
 
 #include <errno.h>
+#include <mhe/model.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -256,24 +257,28 @@ static mhe_status read_costs(const struct reader *r, const mhi_section *section)
     return status;
 }
 
-static mhe_status read_plugin_sections(const struct reader *r) {
+static mhe_status read_plugin_section(const struct reader *r, const mhi_section *s) {
     mhi_run *run = r->run;
+    if (strcmp(s->iface, MHE_COST_IFACE) == 0) {
+        return read_costs(r, s);
+    }
+    mhi_use_section own = {0};
+    mhi_use *use = (mhi_use *)(void *)((unsigned char *)run + s->offset);
+    mhe_status status = read_use(r, s, section_node(run, s->name), use, &own);
+    if (use == &run->model) {
+        run->model_file = (mhi_model_section){.file = own.file, .unsupported = own.unsupported};
+    }
+    return status;
+}
+
+/* All sections that name a plugin, or the one with this interface. */
+static mhe_status read_plugin_sections(const struct reader *r, const char *iface) {
     int32_t n = 0;
     const mhi_section *s = mhi_run_sections(&n);
     mhe_status status = MHE_OK;
     for (const mhi_section *end = s + n; s < end && status == MHE_OK; s++) {
-        mhi_use_section own = {0};
-        if (s->iface == NULL) {
-            continue;
-        }
-        if (strcmp(s->iface, MHE_COST_IFACE) == 0) {
-            status = read_costs(r, s);
-            continue;
-        }
-        mhi_use *use = (mhi_use *)(void *)((unsigned char *)run + s->offset);
-        status = read_use(r, s, section_node(run, s->name), use, &own);
-        if (use == &run->model) {
-            run->model_file = (mhi_model_section){.file = own.file, .unsupported = own.unsupported};
+        if (s->iface != NULL && (iface == NULL || strcmp(s->iface, iface) == 0)) {
+            status = read_plugin_section(r, s);
         }
     }
     return status;
@@ -302,8 +307,10 @@ static mhe_status check_run(const struct reader *r) {
     return MHE_OK;
 }
 
-mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
-                        mhi_registry *registry, mhi_run **out, mhe_error *err) {
+/* The tree, then all sections or (`model_only`) the model's. */
+static mhe_status read_run(const char *path, const char *const *set, int32_t n_set,
+                           mhi_registry *registry, int32_t model_only, mhi_run **out,
+                           mhe_error *err) {
     *out = NULL;
     mhi_run *run = calloc(1, sizeof *run);
     const struct reader reader = {run, registry, err};
@@ -311,16 +318,30 @@ mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
         return no_memory(&reader);
     }
     mhe_status status = read_tree(&reader, path, set, n_set);
-    status = status == MHE_OK ? read_top(&reader) : status;
-    status = status == MHE_OK ? read_plain_sections(&reader) : status;
-    status = status == MHE_OK ? read_plugin_sections(&reader) : status;
-    status = status == MHE_OK ? check_run(&reader) : status;
+    if (model_only) {
+        status = status == MHE_OK ? read_plugin_sections(&reader, MHE_MODEL_IFACE) : status;
+    } else {
+        status = status == MHE_OK ? read_top(&reader) : status;
+        status = status == MHE_OK ? read_plain_sections(&reader) : status;
+        status = status == MHE_OK ? read_plugin_sections(&reader, NULL) : status;
+        status = status == MHE_OK ? check_run(&reader) : status;
+    }
     if (status != MHE_OK) {
         mhi_run_free(run);
         return status;
     }
     *out = run;
     return MHE_OK;
+}
+
+mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
+                        mhi_registry *registry, mhi_run **run, mhe_error *err) {
+    return read_run(path, set, n_set, registry, 0, run, err);
+}
+
+mhe_status mhi_run_read_model(const char *path, const char *const *set, int32_t n_set,
+                              mhi_registry *registry, mhi_run **run, mhe_error *err) {
+    return read_run(path, set, n_set, registry, 1, run, err);
 }
 
 void mhi_run_free(mhi_run *run) {

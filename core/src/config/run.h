@@ -100,7 +100,14 @@ void mhi_run_describe(int32_t format, mhi_text *out);
  * MHE_E_PLUGIN: one line, "file:line: ...". Files of the data section are not opened. [cold] */
 mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
                         mhi_registry *registry, mhi_run **run, mhe_error *err);
+/* The same of a file with sections of another program's: path, name, tree and the model section are
+ * filled, the rest is zero and its keys are not looked at. [cold] */
+mhe_status mhi_run_read_model(const char *path, const char *const *set, int32_t n_set,
+                              mhi_registry *registry, mhi_run **run, mhe_error *err);
 void mhi_run_free(mhi_run *run);
+
+/* "plugin: ...", its own keys and the section's of the model section, behind `indent` blanks. */
+void mhi_run_write_model(const mhi_run *run, int32_t indent, mhi_text *out);
 
 /* The resolved configuration: every key of every section and plugin with its value, YAML that reads
  * back the same. */

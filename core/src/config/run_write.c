@@ -4,6 +4,7 @@
 #include "config/run.h"
 #include "config/run_sections.h"
 
+#include <mhe/model.h>
 #include <string.h>
 
 static void write_use(const mhi_run *run, const mhi_section *section, const mhi_use *use,
@@ -24,6 +25,16 @@ static void write_costs(const mhi_run *run, const mhi_section *section, mhi_text
         write_use(run, section, &run->costs[i], 4, out);
         if (!out->failed) {
             out->data[start + 2] = '-'; /* "    plugin: ..." starts a list entry */
+        }
+    }
+}
+
+void mhi_run_write_model(const mhi_run *run, int32_t indent, mhi_text *out) {
+    int32_t n = 0;
+    const mhi_section *s = mhi_run_sections(&n);
+    for (const mhi_section *end = s + n; s < end; s++) {
+        if (s->iface != NULL && strcmp(s->iface, MHE_MODEL_IFACE) == 0) {
+            write_use(run, s, &run->model, indent, out);
         }
     }
 }

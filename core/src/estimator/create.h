@@ -9,6 +9,12 @@
 
 #include <mhe/estimator.h>
 
+/* The description that a run's model section asks for; what the reader skipped goes to `host`. Also
+ * after a failure the caller gives back what is in `*description` with mhi_description_free. [cold]
+ */
+mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
+                                    mhe_description **description, mhe_error *err);
+
 /* `run` and `host` must outlive it. [cold] */
 mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
                                 mhe_error *err);

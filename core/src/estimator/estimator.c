@@ -15,18 +15,19 @@ static double now(void) {
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static mhe_status read_model(mhe_estimator *e, mhe_error *err) {
-    const mhi_model_section *section = &e->run->model_file;
-    mhe_status status = mhi_model_read(section->file, &e->description, err);
+mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
+                                    mhe_description **description, mhe_error *err) {
+    const mhi_model_section *section = &run->model_file;
+    mhe_status status = mhi_model_read(section->file, description, err);
     if (status != MHE_OK) {
         return status;
     }
-    const mhe_description *d = e->description;
+    const mhe_description *d = *description;
     for (int32_t i = 0; i < d->n_warnings; i++) {
-        e->host->log(e->host, MHE_LOG_WARNING, d->warnings[i]);
+        host->log(host, MHE_LOG_WARNING, d->warnings[i]);
     }
     for (int32_t i = 0; i < d->n_unsupported; i++) {
-        e->host->log(e->host, MHE_LOG_WARNING, d->unsupported[i]);
+        host->log(host, MHE_LOG_WARNING, d->unsupported[i]);
     }
     if (d->n_unsupported > 0 && section->unsupported == MHI_UNSUPPORTED_STOP) {
         return mhe_fail(err, MHE_E_INPUT,
@@ -189,7 +190,7 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
     e->solver = run->solver.plugin->ops;
     e->n = run->horizon.window;
     e->delay = run->data.emg_delay;
-    mhe_status status = read_model(e, err);
+    mhe_status status = mhi_estimator_read_model(run, host, &e->description, err);
     if (status == MHE_OK) {
         status = create_problem(e, err);
         status = status == MHE_OK ? MHE_OK : locate(run, status, err);

@@ -155,7 +155,7 @@ static void to_radians(double *values, int32_t n_frames, const mhe_description *
     }
 }
 
-static mhe_status read_reference(mhi_recording *r, const mhi_run *run, const mhe_description *d,
+static mhe_status read_reference(mhi_recording *r, const char *path, const mhe_description *d,
                                  const mhe_host *host, mhe_error *err) {
     static const mhi_naming q = {"coordinate", {"q_%s", "%s", "q%d"}, 0};
     static const mhi_naming v = {"speed", {"qdot_%s", "%s_u", "%s/speed", "qdot%d"}, 0};
@@ -163,7 +163,7 @@ static mhe_status read_reference(mhi_recording *r, const mhi_run *run, const mhe
     static const mhi_naming e = {"excitation", {"e_%s", "%s.excitation"}, 0};
     static const mhi_naming f = {"force", {"F_%s"}, 0};
     mhi_table *table = NULL;
-    mhe_status status = mhi_sto_read(run->data.reference, &table, err);
+    mhe_status status = mhi_sto_read(path, &table, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -207,6 +207,32 @@ static mhe_status read_reference(mhi_recording *r, const mhi_run *run, const mhe
     return status;
 }
 
+static mhi_recording *new_recording(void) {
+    mhi_recording *r = calloc(1, sizeof *r);
+    if (r != NULL) {
+        r->unit = 1;
+        memcpy(r->unit_name, "m", 2);
+    }
+    return r;
+}
+
+mhe_status mhi_recording_read_reference(const char *path, const mhe_description *d,
+                                        const mhe_host *host, mhi_recording **recording,
+                                        mhe_error *err) {
+    *recording = NULL;
+    mhi_recording *r = new_recording();
+    if (r == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhe_status status = read_reference(r, path, d, host, err);
+    if (status != MHE_OK) {
+        mhi_recording_free(r);
+        return status;
+    }
+    *recording = r;
+    return MHE_OK;
+}
+
 mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, const mhe_host *host,
                               mhi_recording **recording, mhe_error *err) {
     *recording = NULL;
@@ -216,12 +242,10 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
                         "nothing to estimate from",
                         run->path);
     }
-    mhi_recording *r = calloc(1, sizeof *r);
+    mhi_recording *r = new_recording();
     if (r == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    r->unit = 1;
-    memcpy(r->unit_name, "m", 2);
     mhe_status status = MHE_OK;
     if (run->data.markers != NULL) {
         status = read_markers(r, run, d, host, err);
@@ -230,7 +254,7 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
         status = read_emg(r, run, d, host, err);
     }
     if (status == MHE_OK && run->data.reference != NULL) {
-        status = read_reference(r, run, d, host, err);
+        status = read_reference(r, run->data.reference, d, host, err);
     }
     if (status == MHE_OK) {
         warn_uneven(r, run->data.markers != NULL ? run->data.markers : run->data.emg, host);

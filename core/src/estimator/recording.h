@@ -34,6 +34,10 @@ typedef struct mhi_recording {
  * one, is an error. MHE_E_INPUT. [cold] */
 mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *model,
                               const mhe_host *host, mhi_recording **recording, mhe_error *err);
+/* A reference alone, on its own times; markers and emg are NULL. [cold] */
+mhe_status mhi_recording_read_reference(const char *path, const mhe_description *model,
+                                        const mhe_host *host, mhi_recording **recording,
+                                        mhe_error *err);
 void mhi_recording_free(mhi_recording *recording);
 
 #endif
