@@ -1,46 +1,60 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is shown, and the run of gnuplot; picture_script.c writes the script. */
+/* picture.c: what of a run is shown. */
 #include "picture.h"
 
-#include "io/sink.h"
-#include "picture_script.h"
+#include "figure.h"
+#include "io/table.h"
 
-#include <errno.h>
-#include <fcntl.h>
-#include <math.h>
-#include <spawn.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-extern char **environ;
 
 #define DEGREES (180 / 3.14159265358979323846)
+#define ANGLES_MAX 12
+#define FORCES_MAX 8
 
-static void add_panel(picture *p, int32_t column, const char *label, int32_t of_forces) {
-    p->panels[p->n_panels++] = (picture_panel){
-        .column = column, .name = label, .reference_column = -1, .of_forces = of_forces};
+typedef struct picture {
+    const mhi_table *estimates, *forces;
+    const mhi_table *reference; /* or NULL */
+    figure figure;
+} picture;
+
+static void add_series(figure_panel *panel, const mhi_table *t, int32_t column, double scale,
+                       int32_t style) {
+    panel->series[panel->n_series++] = (figure_series){.time = t->time,
+                                                       .values = t->values + column,
+                                                       .n = t->n_rows,
+                                                       .stride = t->n_columns,
+                                                       .scale = scale,
+                                                       .style = style};
+}
+
+static figure_panel *add_panel(picture *p, figure_block *block, const char *name) {
+    block->n_panels++;
+    figure_panel *panel = &p->figure.panels[p->figure.n_panels++];
+    panel->name = name;
+    return panel;
 }
 
 /* The coordinates: columns q_<name> of the estimates, as many as there is room for. */
-static void choose_angles(picture *p) {
+static void choose_angles(picture *p, figure_block *block) {
     const mhi_table *t = p->estimates;
-    for (int32_t i = 0; i < t->n_labels && p->n_panels < PICTURE_ANGLES_MAX; i++) {
+    *block = (figure_block){.heading = "Joint angles", .axis = "angle (°)", .least = 0.1};
+    for (int32_t i = 0; i < t->n_labels && block->n_panels < ANGLES_MAX; i++) {
         if (strncmp(t->labels[i], "q_", 2) != 0) {
             continue;
         }
-        add_panel(p, i, t->labels[i] + 2, 0);
+        figure_panel *panel = add_panel(p, block, t->labels[i] + 2);
+        add_series(panel, t, i, DEGREES, FIGURE_MADE);
         if (p->reference != NULL) {
-            picture_panel *panel = &p->panels[p->n_panels - 1];
             char numbered[16];
-            (void)snprintf(numbered, sizeof numbered, "q%d", p->n_panels - 1);
-            int32_t named = mhi_table_find(p->reference, t->labels[i]);
-            panel->reference_column = named >= 0 ? named : mhi_table_find(p->reference, numbered);
-            panel->reference_scale = p->reference->in_degrees ? 1 : DEGREES;
+            (void)snprintf(numbered, sizeof numbered, "q%d", block->n_panels - 1);
+            int32_t column = mhi_table_find(p->reference, t->labels[i]);
+            column = column >= 0 ? column : mhi_table_find(p->reference, numbered);
+            if (column >= 0) {
+                add_series(panel, p->reference, column, p->reference->in_degrees ? 1 : DEGREES,
+                           FIGURE_TRUE);
+            }
         }
     }
-    p->n_angles = p->n_panels;
 }
 
 static double largest(const mhi_table *t, int32_t column) {
@@ -53,8 +67,10 @@ static double largest(const mhi_table *t, int32_t column) {
 }
 
 /* The muscles with the largest forces, in the order of the model. */
-static void choose_forces(picture *p) {
+static void choose_forces(picture *p, figure_block *block) {
     const mhi_table *t = p->forces;
+    *block = (figure_block){
+        .heading = "Muscle forces", .axis = "force (N)", .least = 1, .holds_zero = 1};
     for (int32_t i = 0; i < t->n_labels; i++) {
         int32_t stronger = 0;
         double force = largest(t, i);
@@ -62,17 +78,41 @@ static void choose_forces(picture *p) {
             double other = largest(t, j);
             stronger += other > force || (other == force && j < i);
         }
-        if (stronger >= PICTURE_FORCES_MAX) {
+        if (stronger >= FORCES_MAX) {
             continue;
         }
-        add_panel(p, i, t->labels[i], 1);
+        figure_panel *panel = add_panel(p, block, t->labels[i]);
+        add_series(panel, t, i, 1, FIGURE_MADE);
         if (p->reference != NULL) {
             char label[256];
             (void)snprintf(label, sizeof label, "F_%s", t->labels[i]);
-            p->panels[p->n_panels - 1].reference_column = mhi_table_find(p->reference, label);
-            p->panels[p->n_panels - 1].reference_scale = 1;
+            int32_t column = mhi_table_find(p->reference, label);
+            if (column >= 0) {
+                add_series(panel, p->reference, column, 1, FIGURE_TRUE);
+            }
         }
     }
+    if (block->n_panels < t->n_labels) {
+        (void)snprintf(block->heading, sizeof block->heading,
+                       "Muscle forces: the %d strongest of %d", block->n_panels, t->n_labels);
+    }
+}
+
+static void compose(picture *p) {
+    figure *f = &p->figure;
+    *f = (figure){.program = "mhe-run",
+                  .name = "estimates",
+                  .begin = p->estimates->time[0],
+                  .end = p->estimates->time[p->estimates->n_rows - 1],
+                  .n_blocks = 2};
+    choose_angles(p, &f->blocks[0]);
+    choose_forces(p, &f->blocks[1]);
+    if (p->reference != NULL) {
+        f->legend[f->n_legend].text = "true";
+        f->legend[f->n_legend++].style = FIGURE_TRUE;
+    }
+    f->legend[f->n_legend].text = "estimated";
+    f->legend[f->n_legend++].style = FIGURE_MADE;
 }
 
 static mhe_status read_in(const char *dir, const char *name, mhi_table **table, mhe_error *err) {
@@ -82,63 +122,6 @@ static mhe_status read_in(const char *dir, const char *name, mhi_table **table, 
         return mhe_fail(err, MHE_E_ARGUMENT, "%s: the path is too long", dir);
     }
     return mhi_sto_read(path, table, err);
-}
-
-static mhe_status write_script(const picture *p, const char *dir, mhe_error *err) {
-    mhi_text script = {0};
-    mhi_outbox *outbox = NULL;
-    picture_script(p, &script);
-    mhe_status status = script.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                      : mhi_outbox_open(dir, &outbox, err);
-    if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, "estimates.gp", script.data, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
-    }
-    mhi_outbox_close(outbox);
-    mhi_text_free(&script);
-    return status;
-}
-
-/* Runs gnuplot without a shell, its streams closed. */
-static mhe_status run_gnuplot(const char *dir, mhe_error *err) {
-    mhi_text command = {0};
-    mhi_text_add(&command, "cd '");
-    for (const char *c = dir; *c != '\0'; c++) {
-        mhi_text_add(&command, *c == '\'' ? "''" : "%c", *c);
-    }
-    mhi_text_add(&command, "'; load 'estimates.gp'");
-    posix_spawn_file_actions_t actions;
-    if (command.failed || posix_spawn_file_actions_init(&actions) != 0) {
-        mhi_text_free(&command);
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    for (int stream = 0; stream < 3; stream++) {
-        (void)posix_spawn_file_actions_addopen(&actions, stream, "/dev/null",
-                                               stream == 0 ? O_RDONLY : O_WRONLY, 0);
-    }
-    char program[] = "gnuplot", defaults[] = "-d", execute[] = "-e";
-    char *arguments[] = {program, defaults, execute, command.data, NULL};
-    pid_t child = -1;
-    int reason = posix_spawnp(&child, program, &actions, NULL, arguments, environ);
-    (void)posix_spawn_file_actions_destroy(&actions);
-    mhi_text_free(&command);
-    if (reason != 0) {
-        return mhe_fail(err, MHE_E_UNSUPPORTED,
-                        "no picture: gnuplot cannot be started (%s); install gnuplot and run "
-                        "'gnuplot estimates.gp' in %s",
-                        strerror(reason), dir);
-    }
-    int result = 0;
-    while (waitpid(child, &result, 0) < 0 && errno == EINTR) {
-    }
-    if (!WIFEXITED(result) || WEXITSTATUS(result) != 0) {
-        return mhe_fail(err, MHE_E_IO,
-                        "no picture: gnuplot failed; run 'gnuplot estimates.gp' in %s to see why",
-                        dir);
-    }
-    return MHE_OK;
 }
 
 mhe_status picture_estimates(const char *dir, const char *reference, mhe_error *err) {
@@ -152,12 +135,8 @@ mhe_status picture_estimates(const char *dir, const char *reference, mhe_error *
     }
     if (status == MHE_OK) {
         picture p = {.estimates = estimates, .forces = forces, .reference = truth};
-        choose_angles(&p);
-        choose_forces(&p);
-        status = write_script(&p, dir, err);
-    }
-    if (status == MHE_OK) {
-        status = run_gnuplot(dir, err);
+        compose(&p);
+        status = figure_draw(&p.figure, dir, err);
     }
     mhi_table_free(estimates);
     mhi_table_free(forces);

@@ -1,13 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Small multiples: joint angles above, muscle forces below, four a row, one legend, one look. */
-#include "picture_script.h"
-
+/* figure_script.c: the figure in gnuplot's language. */
+#include "figure.h"
 #include "io/number.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREES (180 / 3.14159265358979323846)
 #define PER_ROW 4
 #define POINTS_MAX 1500 /* a line: more cannot be seen at this size */
 
@@ -36,19 +34,19 @@ typedef struct range {
     double lower, upper;
 } range;
 
-/* One series as a data block; where one is longer than the eye can follow, evenly thinned. Widens
+/* One series as a data block; where it is longer than the eye can follow, evenly thinned. Widens
  * `y` to what it holds. */
-static void add_data(mhi_text *script, const char *name, int32_t number, const mhi_table *t,
-                     int32_t column, double scale, range time, range *y) {
-    mhi_text_add(script, "$%s%d << END\n", name, number);
-    int32_t step = t->n_rows / POINTS_MAX + 1;
-    for (int32_t k = 0; k < t->n_rows; k += step) {
-        double value = scale * t->values[(size_t)k * (size_t)t->n_columns + (size_t)column];
-        if (t->time[k] < time.lower || t->time[k] > time.upper) {
+static void add_data(mhi_text *script, const figure *f, int32_t panel, int32_t number, range *y) {
+    const figure_series *line = &f->panels[panel].series[number];
+    mhi_text_add(script, "$line%d_%d << END\n", panel, number);
+    int32_t step = line->n / POINTS_MAX + 1;
+    for (int32_t k = 0; k < line->n; k += step) {
+        double value = line->scale * line->values[(ptrdiff_t)k * line->stride];
+        if (line->time[k] < f->begin || line->time[k] > f->end) {
             continue;
         }
         if (isfinite(value)) {
-            mhi_text_add(script, "%.7g %.6g\n", t->time[k], value);
+            mhi_text_add(script, "%.7g %.6g\n", line->time[k], value);
             y->lower = fmin(y->lower, value);
             y->upper = fmax(y->upper, value);
         } else {
@@ -88,20 +86,24 @@ static void add_quoted(mhi_text *script, const char *text) {
     mhi_text_add(script, "'");
 }
 
-static void add_look(mhi_text *script, int32_t height, range time) {
+static void add_look(mhi_text *script, const figure *f, int32_t height) {
     mhi_text_add(script,
-                 "# Made by mhe-run. Change and run it again: gnuplot estimates.gp\n"
+                 "# Made by %s. Change and run it again: gnuplot %s.gp\n"
                  "set terminal svg size %d,%d enhanced font 'Helvetica,Arial,sans-serif,12' "
-                 "background rgb 'white'\nset output 'estimates.svg'\n",
-                 WIDTH, height);
+                 "background rgb 'white'\nset output '%s.svg'\n",
+                 f->program, f->name, WIDTH, height, f->name);
     mhi_text_add(script, "set style line 1 lc rgb '#1b6ca8' lw 1.8\n"
                          "set style line 2 lc rgb '#d1495b' lw 1.8 dt (8,5)\n"
                          "set style line 3 lc rgb '#e3e3e3' lw 0.6\n"
+                         "set style line 4 lc rgb '#8fc1e3' lw 1.8\n"
+                         "set style line 5 lc rgb '#1b6ca8' lw 1.8\n"
+                         "set style line 6 lc rgb '#0b2d48' lw 1.8\n"
+                         "set style line 7 lc rgb '#000000' lw 1.8\n"
                          "set border 3 lc rgb '#555555' lw 0.8\n"
                          "set tics out nomirror scale 0.5 font ',10' textcolor rgb '#444444'\n"
                          "set grid ls 3\nunset key\nset multiplot\n");
-    mhi_text_add(script, "set xrange [%.9g:%.9g]\n", time.lower,
-                 time.upper > time.lower ? time.upper : time.lower + 1);
+    mhi_text_add(script, "set xrange [%.9g:%.9g]\n", f->begin,
+                 f->end > f->begin ? f->end : f->begin + 1);
 }
 
 /* "screen x, screen y" of a point in pixels from the top left. */
@@ -127,15 +129,15 @@ static void add_legend(mhi_text *script, int32_t x, int32_t height, const char *
     mhi_text_add(script, " right font ',13'\n");
 }
 
-/* Panels of one kind under their heading. */
-typedef struct block {
-    int32_t first, n, top;
-} block;
+/* Where a block's panels begin, and its first row in pixels. */
+typedef struct place {
+    int32_t first, top;
+} place;
 
-static void add_panel(const picture *p, int32_t number, block at, int32_t height, range values,
-                      mhi_text *script) {
-    const picture_panel *panel = &p->panels[number];
-    int32_t place = number - at.first, column = place % PER_ROW, row = place / PER_ROW;
+static void add_panel(const figure *f, const figure_block *block, place at, int32_t number,
+                      int32_t height, range values, mhi_text *script) {
+    const figure_panel *panel = &f->panels[number];
+    int32_t position = number - at.first, column = position % PER_ROW, row = position / PER_ROW;
     const int32_t left = LEFT + column * (PANEL_X + GAP_X);
     const double x = left, y = at.top + BLOCK_TOP + row * (PANEL_Y + GAP_Y);
     mhi_text_add(script, "set lmargin at screen %.5f\nset rmargin at screen %.5f\n", x / WIDTH,
@@ -146,54 +148,58 @@ static void add_panel(const picture *p, int32_t number, block at, int32_t height
     add_quoted(script, panel->name);
     mhi_text_add(script, " noenhanced offset 0,-0.6 font ',12'\n");
     if (column == 0) {
-        mhi_text_add(script, "set label '%s' at", panel->of_forces ? "force (N)" : "angle (°)");
+        mhi_text_add(script, "set label '%s' at", block->axis);
         add_point(script, 16, y + PANEL_Y / 2.0, height);
         mhi_text_add(script, " center rotate\n");
     }
-    int32_t is_lowest = place + PER_ROW >= at.n;
+    int32_t is_lowest = position + PER_ROW >= block->n_panels;
     mhi_text_add(script, is_lowest ? "set xlabel 'time (s)' offset 0,0.6\nset format x\n"
                                    : "unset xlabel\nset format x ''\n");
-    add_axis(script, values, panel->of_forces ? 1 : 0.1);
-    mhi_text_add(script, "plot $estimate%d using 1:2 with lines ls 1", number);
-    if (panel->reference_column >= 0) {
-        mhi_text_add(script, ", $truth%d using 1:2 with lines ls 2", number);
+    add_axis(script, values, block->least);
+    for (int32_t i = 0; i < panel->n_series; i++) {
+        mhi_text_add(script, "%s $line%d_%d using 1:2 with lines ls %d", i == 0 ? "plot" : ",",
+                     number, i, panel->series[i].style);
     }
     mhi_text_add(script, "\nunset label\nunset arrow\n");
 }
 
-void picture_script(const picture *p, mhi_text *script) {
+static void add_legends(const figure *f, int32_t height, mhi_text *script) {
+    int32_t x = WIDTH - RIGHT;
+    for (int32_t i = 0; i < f->n_legend; i++) {
+        add_legend(script, x, height, f->legend[i].text, f->legend[i].style);
+        x -= 78 + 8 * (int32_t)strlen(f->legend[i].text);
+    }
+}
+
+void figure_script(const figure *f, mhi_text *script) {
     mhi_c_locale locale = mhi_c_locale_begin();
-    range time = {p->estimates->time[0], p->estimates->time[p->estimates->n_rows - 1]};
-    range y[PICTURE_PANELS_MAX];
-    block angles = {0, p->n_angles, TOP};
-    block forces = {p->n_angles, p->n_panels - p->n_angles, TOP + block_height(p->n_angles)};
-    int32_t height = forces.top + block_height(forces.n);
-    add_look(script, height, time);
-    for (int32_t i = 0; i < p->n_panels; i++) {
-        const picture_panel *panel = &p->panels[i];
-        y[i] = panel->of_forces ? (range){0, 0} : (range){INFINITY, -INFINITY};
-        add_data(script, "estimate", i, panel->of_forces ? p->forces : p->estimates, panel->column,
-                 panel->of_forces ? 1 : DEGREES, time, &y[i]);
-        if (panel->reference_column >= 0) {
-            add_data(script, "truth", i, p->reference, panel->reference_column,
-                     panel->reference_scale, time, &y[i]);
+    range y[FIGURE_PANELS_MAX];
+    place at[FIGURE_BLOCKS_MAX];
+    int32_t block_of[FIGURE_PANELS_MAX];
+    int32_t height = TOP, first = 0;
+    for (int32_t b = 0; b < f->n_blocks; b++) {
+        at[b] = (place){first, height};
+        height += block_height(f->blocks[b].n_panels);
+        for (int32_t i = 0; i < f->blocks[b].n_panels; i++) {
+            block_of[first++] = b;
         }
     }
-    char heading[96] = "Muscle forces";
-    if (forces.n < p->forces->n_labels) {
-        (void)snprintf(heading, sizeof heading, "Muscle forces: the %d strongest of %d", forces.n,
-                       p->forces->n_labels);
+    add_look(script, f, height);
+    for (int32_t i = 0; i < f->n_panels; i++) {
+        y[i] = f->blocks[block_of[i]].holds_zero ? (range){0, 0} : (range){INFINITY, -INFINITY};
+        for (int32_t k = 0; k < f->panels[i].n_series; k++) {
+            add_data(script, f, i, k, &y[i]);
+        }
     }
-    add_heading(script, forces.top, height, heading);
-    if (angles.n > 0) {
-        add_heading(script, angles.top, height, "Joint angles");
+    for (int32_t b = 0; b < f->n_blocks; b++) {
+        if (f->blocks[b].n_panels > 0) {
+            add_heading(script, at[b].top, height, f->blocks[b].heading);
+        }
     }
-    if (p->reference != NULL) {
-        add_legend(script, WIDTH - RIGHT, height, "true", 2);
-    }
-    add_legend(script, WIDTH - RIGHT - 110, height, "estimated", 1);
-    for (int32_t i = 0; i < p->n_panels; i++) {
-        add_panel(p, i, i < angles.n ? angles : forces, height, y[i], script);
+    add_legends(f, height, script);
+    for (int32_t i = 0; i < f->n_panels; i++) {
+        const int32_t b = block_of[i];
+        add_panel(f, &f->blocks[b], at[b], i, height, y[i], script);
     }
     mhi_text_add(script, "unset multiplot\n");
     mhi_c_locale_end(locale);

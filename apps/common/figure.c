@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* figure.c: the script's file, and the run of gnuplot. */
+#include "figure.h"
+
+#include "io/sink.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <spawn.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+extern char **environ;
+
+static mhe_status write_script(const figure *f, const char *dir, mhe_error *err) {
+    mhi_text script = {0}, file = {0};
+    mhi_outbox *outbox = NULL;
+    figure_script(f, &script);
+    mhi_text_add(&file, "%s.gp", f->name);
+    mhe_status status = script.failed || file.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                                     : mhi_outbox_open(dir, &outbox, err);
+    if (status == MHE_OK) {
+        status = mhi_outbox_text(outbox, file.data, script.data, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_commit(outbox, err);
+    }
+    mhi_outbox_close(outbox);
+    mhi_text_free(&script);
+    mhi_text_free(&file);
+    return status;
+}
+
+/* Runs gnuplot without a shell, its streams closed. */
+static mhe_status run_gnuplot(const figure *f, const char *dir, mhe_error *err) {
+    mhi_text command = {0};
+    mhi_text_add(&command, "cd '");
+    for (const char *c = dir; *c != '\0'; c++) {
+        mhi_text_add(&command, *c == '\'' ? "''" : "%c", *c);
+    }
+    mhi_text_add(&command, "'; load '%s.gp'", f->name);
+    posix_spawn_file_actions_t actions;
+    if (command.failed || posix_spawn_file_actions_init(&actions) != 0) {
+        mhi_text_free(&command);
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int stream = 0; stream < 3; stream++) {
+        (void)posix_spawn_file_actions_addopen(&actions, stream, "/dev/null",
+                                               stream == 0 ? O_RDONLY : O_WRONLY, 0);
+    }
+    char program[] = "gnuplot", defaults[] = "-d", execute[] = "-e";
+    char *arguments[] = {program, defaults, execute, command.data, NULL};
+    pid_t child = -1;
+    int reason = posix_spawnp(&child, program, &actions, NULL, arguments, environ);
+    (void)posix_spawn_file_actions_destroy(&actions);
+    mhi_text_free(&command);
+    if (reason != 0) {
+        return mhe_fail(err, MHE_E_UNSUPPORTED,
+                        "no picture: gnuplot cannot be started (%s); install gnuplot and run "
+                        "'gnuplot %s.gp' in %s",
+                        strerror(reason), f->name, dir);
+    }
+    int result = 0;
+    while (waitpid(child, &result, 0) < 0 && errno == EINTR) {
+    }
+    if (!WIFEXITED(result) || WEXITSTATUS(result) != 0) {
+        return mhe_fail(err, MHE_E_IO,
+                        "no picture: gnuplot failed; run 'gnuplot %s.gp' in %s to see why", f->name,
+                        dir);
+    }
+    return MHE_OK;
+}
+
+mhe_status figure_draw(const figure *f, const char *dir, mhe_error *err) {
+    mhe_status status = write_script(f, dir, err);
+    return status == MHE_OK ? run_gnuplot(f, dir, err) : status;
+}
