@@ -1,128 +1,161 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* mhe-sim: simulated motions. */
+/* mhe-sim: simulated motions, and what instruments would record of them. */
+#include "arguments.h"
 #include "console.h"
 #include "motion.h"
+#include "noise.h"
 
 #include <mhe/version.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 static const char help[] =
-    "Simulates motions of a musculoskeletal model; CVODES carries the state.\n"
+    "Simulates motions of a musculoskeletal model (CVODES carries the state), and recordings.\n"
     "\n"
-    "  mhe-sim forward CONFIG.yaml --input EXCITATIONS.sto [options]\n"
-    "  mhe-sim follow CONFIG.yaml --input POSTURES.sto [options]\n"
+    "  mhe-sim forward CONFIG.yaml --input EXCITATIONS.sto [--rate HZ] [options]\n"
+    "  mhe-sim follow CONFIG.yaml --input POSTURES.sto [--rate HZ] [options]\n"
+    "  mhe-sim noise CONFIG.yaml [options]\n"
     "  mhe-sim --version | --help\n"
     "\n"
-    "forward: from the config's initial state under the excitations of the file (one column a "
-    "muscle, linear\n"
-    "between rows). follow: through the postures of the file (one column a coordinate, a "
-    "minimum-jerk path\n"
-    "from row to row) with muscle controls that the config's costs and solver find on the way.\n"
+    "forward: from the config's initial state under the excitations of the file (one column a\n"
+    "muscle, linear between rows). follow: through the postures of the file (one column a\n"
+    "coordinate, a minimum-jerk path from row to row) with muscle controls that the config's\n"
+    "costs and solver find on the way. Both write reference.sto (the truth), markers.trc and\n"
+    "emg.sto, HZ rows a second (default 100).\n"
     "\n"
-    "Both write reference.sto (the truth), markers.trc and emg.sto.\n"
-    "  --out DIR                 default ./out/<config name>-sim\n"
-    "  --rate HZ                 rows a second, default 100\n"
+    "noise: markers.trc and emg.sto as instruments with errors would have recorded them of such\n"
+    "a reference.sto; noise.yaml says what was applied, noise.svg shows it.\n"
+    "'mhe-sim noise --help' shows every key of its config.\n"
+    "\n"
+    "  --out DIR                 default ./out/<config name>-sim, noise: ./out/<config name>\n"
     "  --set path.to.key=value   overrides the config\n"
     "Exit status: 0 done; 1 failed; 2 the command line or an input is wrong.\n";
 
-typedef struct arguments {
-    const char *config, *input, *out;
-    const char **set;
-    int32_t n_set;
-    double rate;
-} arguments;
+/* What a command is run with. */
+typedef struct call {
+    const arguments *arguments;
+    const mhe_host *host;
+    mhi_registry *registry;
+} call;
 
-static const char *const words[] = {"forward", "follow", "--input",   "--rate",
-                                    "--out",   "--set",  "--version", "--help"};
+static mhe_status run_motion(const call *c, mhe_status (*move)(const motion_setup *, mhe_error *),
+                             mhe_error *err) {
+    const arguments *a = c->arguments;
+    mhi_run *config = NULL;
+    char out[4096];
+    mhe_status status = mhi_run_read(a->config, a->set, a->n_set, c->registry, &config, err);
+    if (status == MHE_OK) {
+        status = arguments_folder(a, config->name, "-sim", out, sizeof out, err);
+    }
+    if (status == MHE_OK) {
+        const motion_setup setup = {config, c->host, c->registry, a->input, a->rate, out};
+        status = move(&setup, err);
+    }
+    if (status == MHE_OK) {
+        (void)printf("results in %s\n", out);
+    }
+    mhi_run_free(config);
+    return status;
+}
 
-static mhe_status parse(int argc, char **argv, arguments *a, mhe_error *err) {
-    for (int i = 2; i < argc; i++) {
-        const char *word = argv[i];
-        char hint[256];
-        if (word[0] != '-') {
-            a->config = word;
-            continue;
-        }
-        if (i + 1 >= argc) {
-            return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", word);
-        }
-        const char *value = argv[++i];
-        if (strcmp(word, "--input") == 0) {
-            a->input = value;
-        } else if (strcmp(word, "--out") == 0) {
-            a->out = value;
-        } else if (strcmp(word, "--set") == 0) {
-            a->set[a->n_set++] = value;
-        } else if (strcmp(word, "--rate") == 0) {
-            char *end = NULL;
-            a->rate = strtod(value, &end);
-            if (*end != '\0' || !(a->rate > 0 && a->rate <= 1e5)) {
-                return mhe_fail(err, MHE_E_ARGUMENT,
-                                "--rate '%s': a number of Hz above 0 is needed", value);
-            }
-        } else {
-            return mhe_fail(
-                err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
-                mhi_suggest(hint, sizeof hint, word, words, sizeof words / sizeof words[0]));
-        }
+static mhe_status run_forward(const call *c, mhe_error *err) {
+    return run_motion(c, motion_forward, err);
+}
+
+static mhe_status run_follow(const call *c, mhe_error *err) {
+    return run_motion(c, motion_follow, err);
+}
+
+static mhe_status run_noise(const call *c, mhe_error *err) {
+    const arguments *a = c->arguments;
+    mhi_noise_config config;
+    char out[4096];
+    mhe_status status =
+        mhi_noise_config_read(a->config, a->set, a->n_set, c->registry, &config, err);
+    if (status == MHE_OK) {
+        status = arguments_folder(a, config.run->name, "", out, sizeof out, err);
     }
-    if (a->config == NULL || a->input == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT,
-                        "a config file and --input are needed; 'mhe-sim --help'");
+    if (status == MHE_OK) {
+        status = noise_record(&config, c->host, out, err);
     }
+    if (status == MHE_OK) {
+        (void)printf("results in %s\n", out);
+    }
+    mhi_noise_config_free(&config);
+    return status;
+}
+
+static mhe_status help_motion(mhe_error *err) {
+    (void)err;
+    (void)fputs(help, stdout);
     return MHE_OK;
 }
 
-typedef mhe_status (*motion)(const motion_setup *setup, mhe_error *err);
+static mhe_status help_noise(mhe_error *err) {
+    mhi_text text = {0};
+    mhi_noise_config_describe(&text);
+    (void)fputs("mhe-sim noise CONFIG.yaml [--out DIR] [--set path.to.key=value]...\n\n"
+                "Keys of the config; 'model' is the section that mhe-run has too.\n\n",
+                stdout);
+    return console_print(&text, err);
+}
 
-static mhe_status run(motion move, int argc, char **argv, mhe_error *err) {
+static const struct command {
+    const char *name;
+    int32_t takes_input; /* --input and --rate */
+    mhe_status (*run)(const call *c, mhe_error *err);
+    mhe_status (*help)(mhe_error *err);
+} commands[] = {{"forward", 1, run_forward, help_motion},
+                {"follow", 1, run_follow, help_motion},
+                {"noise", 0, run_noise, help_noise}};
+#define N_COMMANDS ((int32_t)(sizeof commands / sizeof commands[0]))
+
+static mhe_status run_command(const struct command *command, int argc, char **argv,
+                              mhe_error *err) {
     const mhe_host host = console_host("mhe-sim");
-    arguments a = {.rate = 100, .set = calloc((size_t)argc, sizeof(char *))};
-    mhi_registry *registry = NULL;
-    mhi_run *config = NULL;
-    mhe_status status =
-        a.set == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : parse(argc, argv, &a, err);
-    if (status == MHE_OK) {
-        status = mhi_registry_create(&host, &registry, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_run_read(a.config, a.set, a.n_set, registry, &config, err);
-    }
-    if (status == MHE_OK) {
-        mhi_text out = {0};
-        mhi_text_add(&out, "%s%s%s", a.out != NULL ? a.out : "out/",
-                     a.out != NULL ? "" : config->name, a.out != NULL ? "" : "-sim");
-        const motion_setup setup = {config, &host, registry, a.input, a.rate, out.data};
-        status = out.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : move(&setup, err);
+    arguments a;
+    call c = {&a, &host, NULL};
+    mhe_status status = arguments_parse(argc, argv, command->takes_input, &a, err);
+    if (status == MHE_OK && a.help) {
+        status = command->help(err);
+    } else if (status == MHE_OK) {
+        status = mhi_registry_create(&host, &c.registry, err);
         if (status == MHE_OK) {
-            (void)printf("results in %s\n", out.data);
+            status = command->run(&c, err);
         }
-        mhi_text_free(&out);
     }
-    mhi_run_free(config);
-    mhi_registry_free(registry);
-    free(a.set);
+    mhi_registry_free(c.registry);
+    arguments_free(&a);
     return status;
+}
+
+static mhe_status unknown_command(const char *word, mhe_error *err) {
+    const char *names[N_COMMANDS];
+    char hint[256];
+    for (int32_t i = 0; i < N_COMMANDS; i++) {
+        names[i] = commands[i].name;
+    }
+    (void)mhi_suggest(hint, sizeof hint, word == NULL ? "" : word, names, N_COMMANDS);
+    return word == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "no command is given%s", hint)
+                        : mhe_fail(err, MHE_E_ARGUMENT, "unknown command '%s'%s", word, hint);
 }
 
 int main(int argc, char **argv) {
     mhe_error err = {0};
+    const char *word = argc >= 2 ? argv[1] : NULL;
     mhe_status status = MHE_OK;
-    if (argc >= 2 && strcmp(argv[1], "forward") == 0) {
-        status = run(motion_forward, argc, argv, &err);
-    } else if (argc >= 2 && strcmp(argv[1], "follow") == 0) {
-        status = run(motion_follow, argc, argv, &err);
-    } else if (argc >= 2 && strcmp(argv[1], "--version") == 0) {
+    const struct command *command = NULL;
+    for (int32_t i = 0; i < N_COMMANDS && word != NULL; i++) {
+        command = strcmp(word, commands[i].name) == 0 ? &commands[i] : command;
+    }
+    if (command != NULL) {
+        status = run_command(command, argc, argv, &err);
+    } else if (word != NULL && strcmp(word, "--version") == 0) {
         (void)printf("mhe-sim %s\n", MHE_VERSION);
-    } else if (argc >= 2 && strcmp(argv[1], "--help") == 0) {
+    } else if (word != NULL && (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0)) {
         (void)fputs(help, stdout);
     } else {
-        char hint[256];
-        status = mhe_fail(&err, MHE_E_ARGUMENT, "%s'%s'%s",
-                          argc >= 2 ? "unknown command " : "no command ", argc >= 2 ? argv[1] : "",
-                          mhi_suggest(hint, sizeof hint, argc >= 2 ? argv[1] : "", words, 2));
+        status = unknown_command(word, &err);
     }
     if (status != MHE_OK) {
         (void)fprintf(stderr, "mhe-sim: %s\n", err.text);

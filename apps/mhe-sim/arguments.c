@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "arguments.h"
+
+#include "base/text.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Those behind the second are for commands with an input only. */
+static const char *const words[] = {"--out", "--set", "--help", "--input", "--rate"};
+
+static mhe_status read_rate(const char *text, double *rate, mhe_error *err) {
+    char *end = NULL;
+    *rate = strtod(text, &end);
+    if (end == text || *end != '\0' || !(*rate > 0 && *rate <= 1e5)) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "--rate '%s': a number of Hz above 0 is needed", text);
+    }
+    return MHE_OK;
+}
+
+static mhe_status take_option(const char *word, const char *value, int32_t takes_input,
+                              arguments *a, mhe_error *err) {
+    const int32_t n_words = takes_input ? 5 : 3;
+    int32_t known = 0;
+    for (int32_t i = 0; i < n_words; i++) {
+        known = known || strcmp(word, words[i]) == 0;
+    }
+    if (!known) {
+        char hint[256];
+        return mhe_fail(err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
+                        mhi_suggest(hint, sizeof hint, word, words, n_words));
+    }
+    if (value == NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", word);
+    }
+    if (strcmp(word, "--rate") == 0) {
+        return read_rate(value, &a->rate, err);
+    }
+    if (strcmp(word, "--set") == 0) {
+        a->set[a->n_set++] = value;
+    } else {
+        *(strcmp(word, "--input") == 0 ? &a->input : &a->out) = value;
+    }
+    return MHE_OK;
+}
+
+mhe_status arguments_parse(int argc, char **argv, int32_t takes_input, arguments *a,
+                           mhe_error *err) {
+    *a = (arguments){.rate = 100, .set = calloc((size_t)argc, sizeof(char *))};
+    if (a->set == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int i = 2; i < argc; i++) {
+        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
+            a->help = 1;
+            return MHE_OK;
+        }
+    }
+    mhe_status status = MHE_OK;
+    for (int i = 2; i < argc && status == MHE_OK; i++) {
+        if (argv[i][0] == '-') {
+            status = take_option(argv[i], i + 1 < argc ? argv[i + 1] : NULL, takes_input, a, err);
+            i++;
+        } else if (a->config != NULL) {
+            status = mhe_fail(err, MHE_E_ARGUMENT, "one config file at a time: '%s' and '%s'",
+                              a->config, argv[i]);
+        } else {
+            a->config = argv[i];
+        }
+    }
+    if (status == MHE_OK && (a->config == NULL || (takes_input && a->input == NULL))) {
+        status = mhe_fail(err, MHE_E_ARGUMENT, "a config file%s needed; 'mhe-sim --help'",
+                          takes_input ? " and --input are" : " is");
+    }
+    return status;
+}
+
+void arguments_free(arguments *a) {
+    free(a->set);
+}
+
+mhe_status arguments_folder(const arguments *a, const char *name, const char *suffix, char *out,
+                            size_t size, mhe_error *err) {
+    const int n = a->out != NULL ? snprintf(out, size, "%s", a->out)
+                                 : snprintf(out, size, "out/%s%s", name, suffix);
+    return n >= 0 && (size_t)n < size
+               ? MHE_OK
+               : mhe_fail(err, MHE_E_ARGUMENT, "the path of the output folder is too long");
+}

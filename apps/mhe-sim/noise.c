@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "noise.h"
+
+#include "base/arena.h"
+#include "estimator/create.h"
+#include "io/model_file.h"
+#include "io/sink.h"
+
+typedef struct recorder {
+    const mhi_noise_config *config;
+    const mhe_host *host;
+    mhe_description *model;
+    mhi_recording *reference;
+    mhi_record markers, emg;
+    mhi_outbox *outbox;
+    mhi_arena arena;
+} recorder;
+
+static mhe_status record(recorder *r, mhe_error *err) {
+    const mhi_noise_config *c = r->config;
+    mhe_status status = mhi_estimator_read_model(c->run, r->host, &r->model, err);
+    if (status == MHE_OK) {
+        status = mhi_recording_read_reference(c->reference, r->model, r->host, &r->reference, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_noise_markers(&c->noise, r->reference, r->model, c->run->model.plugin,
+                                   c->run->model.config, r->host, &r->markers, err);
+    }
+    return status == MHE_OK ? mhi_noise_emg(&c->noise, r->reference, r->model, &r->emg, err)
+                            : status;
+}
+
+static mhe_status write_rows(const mhi_record *record, mhi_sink *sink, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t k = 0; k < record->n_samples && status == MHE_OK; k++) {
+        status = mhi_sink_row(sink, record->time[k],
+                              record->values + (ptrdiff_t)k * record->n_channels, err);
+    }
+    return status;
+}
+
+static mhe_status write_markers(recorder *r, mhe_error *err) {
+    const mhe_description *d = r->model;
+    mhi_sink *sink = NULL;
+    const char **names = MHI_TAKE(&r->arena, const char *, d->n_markers);
+    if (names == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < d->n_markers; i++) {
+        names[i] = d->markers[i].name;
+    }
+    mhe_status status = mhi_sink_trc(r->outbox, "markers.trc", names, d->n_markers, r->markers.rate,
+                                     1e-3, "mm", &sink, err);
+    return status == MHE_OK ? write_rows(&r->markers, sink, err) : status;
+}
+
+static mhe_status write_emg(recorder *r, mhe_error *err) {
+    const mhe_description *d = r->model;
+    mhi_sink *sink = NULL;
+    const char **names = MHI_TAKE(&r->arena, const char *, d->n_muscles);
+    if (names == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        names[i] = d->muscles[i].name;
+    }
+    mhe_status status =
+        mhi_sink_sto(r->outbox, "emg.sto", "EMG, normalised", names, d->n_muscles, &sink, err);
+    return status == MHE_OK ? write_rows(&r->emg, sink, err) : status;
+}
+
+static mhe_status write_config(recorder *r, mhe_error *err) {
+    mhi_text text = {0};
+    mhi_noise_config_write(r->config, &text);
+    mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                    : mhi_outbox_text(r->outbox, "noise.yaml", text.data, err);
+    mhi_text_free(&text);
+    return status;
+}
+
+/* A recording without its picture is complete. */
+static void draw(recorder *r, const char *out) {
+    mhe_error why = {0};
+    if (r->config->output.picture &&
+        noise_picture(r->config, r->reference, r->model, out, &why) != MHE_OK) {
+        r->host->log(r->host, MHE_LOG_WARNING, why.text);
+    }
+}
+
+mhe_status noise_record(const mhi_noise_config *config, const mhe_host *host, const char *out,
+                        mhe_error *err) {
+    recorder r = {.config = config, .host = host};
+    mhe_status status = record(&r, err);
+    if (status == MHE_OK) {
+        status = mhi_outbox_open(out, &r.outbox, err);
+    }
+    if (status == MHE_OK) {
+        status = write_markers(&r, err);
+    }
+    if (status == MHE_OK) {
+        status = write_emg(&r, err);
+    }
+    if (status == MHE_OK) {
+        status = write_config(&r, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_commit(r.outbox, err);
+    }
+    if (status == MHE_OK) {
+        draw(&r, out);
+    }
+    mhi_outbox_close(r.outbox);
+    mhi_record_free(&r.markers);
+    mhi_record_free(&r.emg);
+    mhi_recording_free(r.reference);
+    mhi_description_free(r.model);
+    mhi_arena_free(&r.arena);
+    return status;
+}
