@@ -4,6 +4,7 @@
 #include "support.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define DOCUMENT(content)                                                  \
@@ -227,11 +228,35 @@ static void files_are_told_apart_by_content(void **state) {
     assert_non_null(strstr(err.text, "/nowhere/arm.osim"));
 }
 
+/* Each frame fixed to the next: used to take one stack frame each. */
+static void long_chain_of_frames(void **state) {
+    (void)state;
+    enum { N = 20000, EACH = 128 };
+    char *text = malloc(N * EACH + 1024);
+    assert_non_null(text);
+    size_t at = (size_t)sprintf(text, "<OpenSimDocument><Model name=\"test\">\n<components>\n");
+    for (int i = 0; i < N; i++) {
+        at +=
+            (size_t)sprintf(text + at,
+                            "<PhysicalOffsetFrame name=\"f%d\"><socket_parent>/f%d</socket_parent>"
+                            "</PhysicalOffsetFrame>\n",
+                            i, i + 1);
+    }
+    (void)sprintf(text + at, "</components>\n%s</Model></OpenSimDocument>\n",
+                  MARKER("/f0", "0 0 0"));
+    mhe_description *d = NULL;
+    mhe_error err = {0};
+    assert_int_equal(mhi_osim_parse("m", text, strlen(text), &d, &err), MHE_E_INPUT);
+    assert_string_equal(err.text, "m:103: frame '/f100': more than 100 frames fixed to each other");
+    free(text);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(mistakes_are_named_with_their_line),
                                        cmocka_unit_test(frames_and_bodies_in_a_circle),
                                        cmocka_unit_test(unsupported_things_are_named),
                                        cmocka_unit_test(what_does_nothing_is_not_listed),
-                                       cmocka_unit_test(files_are_told_apart_by_content)};
+                                       cmocka_unit_test(files_are_told_apart_by_content),
+                                       cmocka_unit_test(long_chain_of_frames)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

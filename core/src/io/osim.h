@@ -21,6 +21,7 @@ typedef struct mhi_osim {
     mhi_builder b;
     xmlNode *model;
     mhi_list frames; /* mhi_osim_frame */
+    int32_t depth;   /* of frames fixed to frames, while one is looked up */
 } mhi_osim;
 
 /* osim_xml.c: elements and their values. Names are those of tags; memory is the builder's. */

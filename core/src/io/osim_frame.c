@@ -5,6 +5,9 @@
 
 #include <string.h>
 
+#define FRAMES_DEEP 100 /* frames fixed to frames; a file of nothing else would exhaust the stack \
+                         */
+
 #define FRAME(o, i) ((mhi_osim_frame *)(o)->frames.items[i])
 
 /* Offset frames among the children of `holder`, which live at `owner`. */
@@ -157,9 +160,16 @@ int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int
         mhi_build_fail(&o->b, frame->line, "frame '%s' is fixed to itself", frame->path);
         return 0;
     }
+    if (o->depth == FRAMES_DEEP) {
+        mhi_build_fail(&o->b, frame->line, "frame '%s': more than %d frames fixed to each other",
+                       frame->path, FRAMES_DEEP);
+        return 0;
+    }
     mhi_transform parent;
     frame->visiting = 1;
+    o->depth++;
     int32_t ok = mhi_osim_resolve(o, frame->parent, frame->path, frame->line, body, &parent);
+    o->depth--;
     frame->visiting = 0;
     *in_body = mhi_transform_times(&parent, &frame->in_parent);
     return ok;
