@@ -58,10 +58,12 @@ static void posture_at(const follow *f, double time, double *q) {
     const int32_t next = row + 1 < p->n_rows ? row + 1 : row;
     const double span = next > row ? p->time[next] - p->time[row] : 1;
     const double way = minimum_jerk(fmin(fmax((time - p->time[row]) / span, 0), 1));
+    const mhe_coordinate *c = mhi_system_description(f->simulation.system)->coordinates;
     for (int32_t i = 0; i < f->simulation.n_q; i++) {
         const double from = p->values[(ptrdiff_t)row * p->n_columns + f->column[i]];
         const double to = p->values[(ptrdiff_t)next * p->n_columns + f->column[i]];
-        q[i] = (from + (to - from) * way) * (p->in_degrees ? acos(-1) / 180 : 1);
+        const double unit = p->in_degrees && c[i].rotational ? acos(-1) / 180 : 1;
+        q[i] = (from + (to - from) * way) * unit;
     }
 }
 
