@@ -12,10 +12,14 @@
 #include <string.h>
 #include <unistd.h>
 
+/* What of the file is read; other sections belong to another program. */
+enum { SCOPE_ALL, SCOPE_MODEL, SCOPE_STEPS };
+
 struct reader {
     mhi_run *run;
     mhi_registry *registry;
     mhe_error *err;
+    int32_t scope; /* SCOPE_* */
 };
 
 static mhe_status no_memory(const struct reader *r) {
@@ -109,7 +113,8 @@ static mhe_status read_top(const struct reader *r) {
         return no_memory(r);
     }
     for (int32_t i = 1; i < n; i++) { /* 0 is the top level itself */
-        names[i - 1] = sections[i].name;
+        const int costs = strcmp(sections[i].name, "costs") == 0;
+        names[i - 1] = costs && r->scope == SCOPE_STEPS ? "steps" : sections[i].name;
     }
     mhi_top_section top = {0};
     mhe_status status = mhi_options_fill(options, n_top, run->tree, mhi_tree_root(run->tree), names,
@@ -235,24 +240,30 @@ static mhe_status read_use(const struct reader *r, const mhi_section *section, c
     return status;
 }
 
-static mhe_status read_costs(const struct reader *r, const mhi_section *section) {
-    mhi_run *run = r->run;
-    const mhi_node *list = section_node(run, section->name);
+static mhe_status read_costs(const struct reader *r, const mhi_node *owner, const mhi_node *list,
+                             mhi_use **uses, int32_t *n_uses) {
+    int32_t n = 0;
+    const mhi_section *section = mhi_run_sections(&n);
+    while (section->iface == NULL || strcmp(section->iface, MHE_COST_IFACE) != 0) {
+        section++;
+    }
     if (list == NULL || list->kind != MHI_SEQUENCE || list->first == NULL) {
-        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, list,
+        return mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, list != NULL ? list : owner,
                            "costs: a list with at least one entry is needed, like "
                            "[{plugin: mhe.cost.emg-markers-high}]");
     }
-    run->n_costs = mhi_node_count(list);
-    run->costs = MHI_TAKE(&run->arena, mhi_use, run->n_costs);
-    if (run->costs == NULL) {
+    *n_uses = mhi_node_count(list);
+    mhi_use *use = *uses = MHI_TAKE(&r->run->arena, mhi_use, *n_uses);
+    if (use == NULL) {
         return no_memory(r);
     }
     mhe_status status = MHE_OK;
-    mhi_use *use = run->costs;
-    for (const mhi_node *node = list->first; node != NULL && status == MHE_OK; node = node->next) {
+    for (mhi_node *node = list->first; node != NULL && status == MHE_OK; node = node->next) {
         mhi_use_section own = {0};
-        status = read_use(r, section, node, use++, &own);
+        status = mhi_node_expand(r->run->tree, node, "plugin", r->err);
+        if (status == MHE_OK) {
+            status = read_use(r, section, node, use++, &own);
+        }
     }
     return status;
 }
@@ -260,7 +271,9 @@ static mhe_status read_costs(const struct reader *r, const mhi_section *section)
 static mhe_status read_plugin_section(const struct reader *r, const mhi_section *s) {
     mhi_run *run = r->run;
     if (strcmp(s->iface, MHE_COST_IFACE) == 0) {
-        return read_costs(r, s);
+        const mhi_node *list = section_node(run, s->name);
+        return r->scope == SCOPE_STEPS ? MHE_OK
+                                       : read_costs(r, NULL, list, &run->costs, &run->n_costs);
     }
     mhi_use_section own = {0};
     mhi_use *use = (mhi_use *)(void *)((unsigned char *)run + s->offset);
@@ -307,18 +320,17 @@ static mhe_status check_run(const struct reader *r) {
     return MHE_OK;
 }
 
-/* The tree, then all sections or (`model_only`) the model's. */
+/* The tree, then all sections or those of a scope. */
 static mhe_status read_run(const char *path, const char *const *set, int32_t n_set,
-                           mhi_registry *registry, int32_t model_only, mhi_run **out,
-                           mhe_error *err) {
+                           mhi_registry *registry, int32_t scope, mhi_run **out, mhe_error *err) {
     *out = NULL;
     mhi_run *run = calloc(1, sizeof *run);
-    const struct reader reader = {run, registry, err};
+    const struct reader reader = {run, registry, err, scope};
     if (run == NULL) {
         return no_memory(&reader);
     }
     mhe_status status = read_tree(&reader, path, set, n_set);
-    if (model_only) {
+    if (scope == SCOPE_MODEL) {
         status = status == MHE_OK ? read_plugin_sections(&reader, MHE_MODEL_IFACE) : status;
     } else {
         status = status == MHE_OK ? read_top(&reader) : status;
@@ -336,12 +348,23 @@ static mhe_status read_run(const char *path, const char *const *set, int32_t n_s
 
 mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
                         mhi_registry *registry, mhi_run **run, mhe_error *err) {
-    return read_run(path, set, n_set, registry, 0, run, err);
+    return read_run(path, set, n_set, registry, SCOPE_ALL, run, err);
 }
 
 mhe_status mhi_run_read_model(const char *path, const char *const *set, int32_t n_set,
                               mhi_registry *registry, mhi_run **run, mhe_error *err) {
-    return read_run(path, set, n_set, registry, 1, run, err);
+    return read_run(path, set, n_set, registry, SCOPE_MODEL, run, err);
+}
+
+mhe_status mhi_run_read_base(const char *path, const char *const *set, int32_t n_set,
+                             mhi_registry *registry, mhi_run **run, mhe_error *err) {
+    return read_run(path, set, n_set, registry, SCOPE_STEPS, run, err);
+}
+
+mhe_status mhi_run_read_costs(mhi_run *run, mhi_registry *registry, const mhi_node *owner,
+                              mhi_use **costs, int32_t *n, mhe_error *err) {
+    const struct reader reader = {run, registry, err, SCOPE_STEPS};
+    return read_costs(&reader, owner, mhi_node_find(owner, "costs"), costs, n);
 }
 
 void mhi_run_free(mhi_run *run) {

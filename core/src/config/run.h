@@ -104,6 +104,13 @@ mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
  * filled, the rest is zero and its keys are not looked at. [cold] */
 mhe_status mhi_run_read_model(const char *path, const char *const *set, int32_t n_set,
                               mhi_registry *registry, mhi_run **run, mhe_error *err);
+/* The same of a file whose costs stand in a list `steps` that is left to the caller (run_steps.h).
+ * [cold] */
+mhe_status mhi_run_read_base(const char *path, const char *const *set, int32_t n_set,
+                             mhi_registry *registry, mhi_run **run, mhe_error *err);
+/* The list `costs` in a mapping of the run's tree; the uses live as long as the run. [cold] */
+mhe_status mhi_run_read_costs(mhi_run *run, mhi_registry *registry, const mhi_node *owner,
+                              mhi_use **costs, int32_t *n, mhe_error *err);
 void mhi_run_free(mhi_run *run);
 
 /* "plugin: ...", its own keys and the section's of the model section, behind `indent` blanks. */
