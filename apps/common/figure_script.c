@@ -174,32 +174,34 @@ static void add_legends(const figure *f, int32_t height, mhi_text *script) {
 void figure_script(const figure *f, mhi_text *script) {
     mhi_c_locale locale = mhi_c_locale_begin();
     range y[FIGURE_PANELS_MAX];
-    place at[FIGURE_BLOCKS_MAX];
-    int32_t block_of[FIGURE_PANELS_MAX];
-    int32_t height = TOP, first = 0;
+    place at[FIGURE_BLOCKS_MAX] = {{0, TOP}};
+    int32_t height = TOP, n_panels = 0;
     for (int32_t b = 0; b < f->n_blocks; b++) {
-        at[b] = (place){first, height};
+        at[b] = (place){n_panels, height};
         height += block_height(f->blocks[b].n_panels);
-        for (int32_t i = 0; i < f->blocks[b].n_panels; i++) {
-            block_of[first++] = b;
-        }
+        n_panels += f->blocks[b].n_panels;
     }
     add_look(script, f, height);
-    for (int32_t i = 0; i < f->n_panels; i++) {
-        y[i] = f->blocks[block_of[i]].holds_zero ? (range){0, 0} : (range){INFINITY, -INFINITY};
-        for (int32_t k = 0; k < f->panels[i].n_series; k++) {
-            add_data(script, f, i, k, &y[i]);
+    for (int32_t b = 0; b < f->n_blocks; b++) {
+        const figure_block *block = &f->blocks[b];
+        for (int32_t i = at[b].first; i < at[b].first + block->n_panels; i++) {
+            y[i] = block->holds_zero ? (range){0, 0} : (range){INFINITY, -INFINITY};
+            for (int32_t k = 0; k < f->panels[i].n_series; k++) {
+                add_data(script, f, i, k, &y[i]);
+            }
         }
     }
-    for (int32_t b = 0; b < f->n_blocks; b++) {
+    for (int32_t b = 0; b < f->n_blocks; b++) { /* before the first panel takes its labels away */
         if (f->blocks[b].n_panels > 0) {
             add_heading(script, at[b].top, height, f->blocks[b].heading);
         }
     }
     add_legends(f, height, script);
-    for (int32_t i = 0; i < f->n_panels; i++) {
-        const int32_t b = block_of[i];
-        add_panel(f, &f->blocks[b], at[b], i, height, y[i], script);
+    for (int32_t b = 0; b < f->n_blocks; b++) {
+        const figure_block *block = &f->blocks[b];
+        for (int32_t i = at[b].first; i < at[b].first + block->n_panels; i++) {
+            add_panel(f, block, at[b], i, height, y[i], script);
+        }
     }
     mhi_text_add(script, "unset multiplot\n");
     mhi_c_locale_end(locale);

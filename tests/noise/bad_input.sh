@@ -100,6 +100,11 @@ sed -i '20s/^\([0-9.]*\)\t[-0-9.e]*/\1\tnan/' demo_reference.sto
 expect reference-with-gap "no value of 'Arm_RotY' at 0.12 s"
 head -c 4000 /dev/urandom > demo_reference.sto
 expect random-bytes 'demo_reference.sto'
+mkdir kept
+mv noise.yaml kept
+expect own-config 'kept/noise.yaml would be overwritten' kept/noise.yaml --set reference="$arm/demo_reference.sto" \
+    --set model.file="$arm/arm19.osim" --out kept
+cmp -s kept/noise.yaml "$arm/noise.yaml" || wrong "own-config: it was"
 want=1
 expect output-is-a-file 'stdout.txt' noise.yaml --out stdout.txt/x
 
