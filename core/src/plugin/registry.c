@@ -142,22 +142,27 @@ static mhe_status add_from_environment(mhi_registry *r, mhe_error *err) {
     return MHE_OK;
 }
 
-/* The installed folder as seen from the running program, so that a moved installation still finds
- * its plugins. */
-static mhe_status add_beside_program(mhi_registry *r, mhe_error *err) {
-    char program[PATH_MAX];
+/* The installed folder, first as seen from the running program, so that a moved installation still
+ * finds its plugins; the build tree for programs of the build tree alone: what is installed does
+ * not depend on who may write where it was built. */
+static mhe_status add_installed_and_built(mhi_registry *r, mhe_error *err) {
+    char program[PATH_MAX] = "", built[PATH_MAX];
     ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    if (n <= 0) {
-        return MHE_OK;
-    }
-    program[n] = '\0';
+    program[n < 0 ? 0 : n] = '\0';
+    const int is_built = realpath(MHE_BUILD_DIR, built) != NULL &&
+                         strncmp(program, built, strlen(built)) == 0 &&
+                         program[strlen(built)] == '/';
     char *slash = strrchr(program, '/');
-    if (slash == NULL) {
-        return MHE_OK;
+    mhe_status status = MHE_OK;
+    if (slash != NULL) {
+        *slash = '\0';
+        char *path = mhi_arena_format(&r->arena, "%s/%s", program, MHE_PLUGIN_DIR_FROM_BIN);
+        status = path == NULL ? no_memory(err) : add_standard(r, path, err);
     }
-    *slash = '\0';
-    char *path = mhi_arena_format(&r->arena, "%s/%s", program, MHE_PLUGIN_DIR_FROM_BIN);
-    return path == NULL ? no_memory(err) : add_standard(r, path, err);
+    if (status == MHE_OK) {
+        status = add_standard(r, MHE_INSTALLED_PLUGIN_DIR, err);
+    }
+    return status == MHE_OK && is_built ? add_standard(r, MHE_BUILD_PLUGIN_DIR, err) : status;
 }
 
 mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mhe_error *err) {
@@ -168,13 +173,7 @@ mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mh
     r->host = host;
     mhe_status status = add_from_environment(r, err);
     if (status == MHE_OK) {
-        status = add_beside_program(r, err);
-    }
-    if (status == MHE_OK) {
-        status = add_standard(r, MHE_INSTALLED_PLUGIN_DIR, err);
-    }
-    if (status == MHE_OK) {
-        status = add_standard(r, MHE_BUILD_PLUGIN_DIR, err);
+        status = add_installed_and_built(r, err);
     }
     if (status != MHE_OK) {
         mhi_registry_free(r);

@@ -10,8 +10,8 @@
 typedef struct mhi_registry mhi_registry;
 
 /* An empty registry that already knows its standard folders: MHE_PLUGIN_PATH (':' between folders),
- * the installed <libdir>/mhe/plugins/abi0, the build tree's plugin folder. They are scanned at the
- * first look-up. `host` is lent for life. [cold] */
+ * the installed <libdir>/mhe/plugins/abi0, for programs of the build tree its plugin folder. They
+ * are scanned at the first look-up. `host` is lent for life. [cold] */
 mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mhe_error *err);
 void mhi_registry_free(mhi_registry *registry); /* libraries stay loaded until exit */
 
