@@ -201,7 +201,7 @@ static void test_refused(void **state) {
         {HEAD "steps:\n  - name: a\n    bounds: [{signal: q, value: [9], to: 0}]\n" COSTS,
          "leaves nothing"},
         {HEAD "steps:\n  - name: a\n    costs: [{" TRACK ", signal: torque}]\n",
-         "step 'a': mhe.cost.track: the problem has no signal 'torque'"},
+         "step 'a': costs.0: mhe.cost.track: the problem has no signal 'torque'"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
         problem p;

@@ -37,26 +37,28 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
     return MHE_OK;
 }
 
-/* A plugin refuses to be created with a message that begins with its id: puts the line of the
- * config before it. Two costs with one id cannot be told apart; the file alone is named then. */
+/* A plugin's refusal to be created begins with its id, that of a cost with "costs.<position>: ":
+ * puts the line of the config before it. */
 static mhe_status locate(const mhi_run *run, mhe_status status, mhe_error *err) {
     const mhi_use *const parts[] = {&run->model, &run->muscle, &run->integrator, &run->solver};
-    const int32_t n_parts = (int32_t)(sizeof parts / sizeof parts[0]);
-    const mhi_node *node = NULL;
-    int32_t n_found = 0;
-    for (int32_t i = 0; i < n_parts + run->n_costs && err != NULL; i++) {
-        const mhi_use *use = i < n_parts ? parts[i] : &run->costs[i - n_parts];
-        const size_t length = strlen(use->plugin->id);
-        if (strncmp(err->text, use->plugin->id, length) == 0 && err->text[length] == ':') {
-            node = use->node;
-            n_found++;
-        }
+    const mhi_use *found = NULL;
+    int position = -1;
+    if (err == NULL) {
+        return status;
     }
-    if (n_found == 0) {
+    if (sscanf(err->text, "costs.%d: ", &position) == 1 && position < run->n_costs) {
+        found = &run->costs[position];
+    }
+    for (size_t i = 0; i < sizeof parts / sizeof parts[0] && found == NULL; i++) {
+        const size_t length = strlen(parts[i]->plugin->id);
+        const int same = strncmp(err->text, parts[i]->plugin->id, length) == 0;
+        found = same && err->text[length] == ':' ? parts[i] : NULL;
+    }
+    if (found == NULL) {
         return status;
     }
     const mhe_error why = *err;
-    return mhi_fail_at(err, status, run->tree, n_found == 1 ? node : NULL, "%s", why.text);
+    return mhi_fail_at(err, status, run->tree, found->node, "%s", why.text);
 }
 
 static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {

@@ -163,6 +163,18 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     return MHE_OK;
 }
 
+/* Term i, whose refusal begins with "costs.<i>: ". */
+static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t i, mhe_error *err) {
+    mhe_status status = mhi_term_create(setup->host, &setup->terms[i], &ocp->problem, &ocp->signals,
+                                        &ocp->arena, &ocp->terms[i], err);
+    ocp->n_terms_created = i + 1;
+    if (status != MHE_OK && err != NULL) {
+        const mhe_error why = *err;
+        return mhe_fail(err, status, "costs.%d: %.700s", i, why.text);
+    }
+    return status;
+}
+
 static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     const mhe_system *f = mhi_system_face(setup->system);
     mhi_signals_layout(setup->system, &ocp->signals);
@@ -171,9 +183,7 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
         status = set_problem(ocp, setup, err);
     }
     for (int32_t i = 0; i < setup->n_terms && status == MHE_OK; i++) {
-        status = mhi_term_create(setup->host, &setup->terms[i], &ocp->problem, &ocp->signals,
-                                 &ocp->arena, &ocp->terms[i], err);
-        ocp->n_terms_created = i + 1;
+        status = create_term(ocp, setup, i, err);
         if (status == MHE_OK) {
             ocp->wanted |= mhi_term_reads(&ocp->terms[i]);
         }
