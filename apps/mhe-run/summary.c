@@ -5,6 +5,7 @@
 #include <math.h>
 #include <mhe/version.h>
 #include <stdlib.h>
+#include <string.h>
 #include <sys/resource.h>
 
 mhe_status summary_add(summary *s, const mhe_estimate *estimate, mhe_error *err) {
@@ -126,12 +127,19 @@ void summary_lines(const summary *s, mhi_text *out) {
         mhi_text_add(out, "rate %.1f Hz mean; solve %.2f ms median, %.2f ms p99, %.2f ms max\n",
                      1e3 / mean_ms(s), percentile(s, 0.5), percentile(s, 0.99), percentile(s, 1));
     }
-    if (s->has_rmse && !isnan(s->rmse.q)) {
-        const double degrees = 180 / acos(-1);
-        mhi_text_add(
-            out,
-            "error against the reference (RMSE): joint angles %.4g deg, muscle forces %.4g N, "
-            "markers %.4g mm\n",
-            degrees * s->rmse.q, s->rmse.force, 1e3 * s->rmse.marker);
+    const struct {
+        const char *what, *unit;
+        double value;
+    } errors[] = {{"joint angles", "deg", 180 / acos(-1) * s->rmse.q},
+                  {"muscle forces", "N", s->rmse.force},
+                  {"markers", "mm", 1e3 * s->rmse.marker}};
+    const char *lead = "error against the reference (RMSE): ";
+    for (size_t i = 0; i < sizeof errors / sizeof errors[0] && s->has_rmse; i++) {
+        if (!isnan(errors[i].value)) {
+            mhi_text_add(out, "%s%s %.4g %s", lead, errors[i].what, errors[i].value,
+                         errors[i].unit);
+            lead = ", ";
+        }
     }
+    mhi_text_add(out, strcmp(lead, ", ") == 0 ? "\n" : "");
 }

@@ -114,7 +114,7 @@ static mhe_status write_texts(tracking *t, mhe_error *err) {
 static void draw(tracking *t) {
     const mhi_run *run = t->setup->run;
     mhe_error why = {0};
-    if (!run->output.picture) {
+    if (!run->output.picture || t->summary.info.n_muscles == 0) { /* no forces to show */
         return;
     }
     mhe_status status = picture_estimates(t->setup->out, run->data.reference, &why);
