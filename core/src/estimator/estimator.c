@@ -350,9 +350,7 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     *estimate = (mhe_estimate){.size = sizeof *estimate};
     mhe_status status = mhi_window_prepare(e, err);
     if (status == MHE_OK) {
-        status = mhi_window_solve(e, &info, &estimate->status, err);
-    }
-    if (status == MHE_OK) {
+        mhi_window_solve(e, &info, &estimate->status);
         status = give_estimate(e, estimate, err);
     }
     mhi_window_advance(e); /* in any case: the next frame needs its place */

@@ -34,7 +34,8 @@ struct mhe_estimator {
     int64_t n_frames; /* pushed so far */
     double last_time;
 
-    int32_t solved; /* windows so far */
+    int32_t solved;       /* windows so far */
+    int32_t failure_told; /* the host knows that the solver gave an error */
     mhe_solution solution;
     double *guess_x, *guess_u;           /* what the last solve started from */
     double *prior_centre, *prior_weight; /* [n_x], of the first window's proximal term */
@@ -53,8 +54,7 @@ void mhi_window_append(mhe_estimator *e, double time, const double *markers, con
 /* Bounds, targets and start of the next solve. */
 mhe_status mhi_window_prepare(mhe_estimator *e, mhe_error *err);
 /* Solves; the outcome as MHE_FRAME_*. */
-mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
-                            mhe_error *err);
+void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status);
 /* Drops the oldest node and shifts the solution to start the next. */
 void mhi_window_advance(mhe_estimator *e);
 

@@ -241,9 +241,24 @@ static mhe_status solve_first(mhe_estimator *e, mhe_solve_info *info, mhe_error 
     return status;
 }
 
-mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
-                            mhe_error *err) {
-    const mhe_status status = (e->solved == 0 ? solve_first : solve_once)(e, info, err);
+/* A solver that cannot compute at all (its linear solver is not installed) does so at every frame:
+ * it is told once. */
+static void tell_failure(mhe_estimator *e, const char *why) {
+    if (!e->failure_told) {
+        char line[MHE_ERROR_TEXT + 64];
+        (void)snprintf(line, sizeof line, "%s: from %g s on: %s", e->run->solver.plugin->id,
+                       e->times[0], why);
+        e->host->log(e->host, MHE_LOG_WARNING, line);
+        e->failure_told = 1;
+    }
+}
+
+void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status) {
+    mhe_error why = {0};
+    const mhe_status status = (e->solved == 0 ? solve_first : solve_once)(e, info, &why);
+    if (status != MHE_OK) {
+        tell_failure(e, why.text);
+    }
     const int usable = status == MHE_OK && info->primal_residual <= CONSISTENT &&
                        all_finite(e->solution.x, (ptrdiff_t)(e->n + 1) * e->n_x) &&
                        all_finite(e->solution.u, (ptrdiff_t)e->n * e->n_u);
@@ -258,7 +273,6 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
         *frame_status = MHE_FRAME_PREDICTED;
     }
     e->solved++;
-    return MHE_OK;
 }
 
 void mhi_window_advance(mhe_estimator *e) {
