@@ -4,6 +4,7 @@
 #include "console.h"
 #include "motion.h"
 #include "noise.h"
+#include "reference.h"
 
 #include <mhe/version.h>
 #include <stdio.h>
@@ -14,6 +15,7 @@ static const char help[] =
     "\n"
     "  mhe-sim forward CONFIG.yaml --input EXCITATIONS.sto [--rate HZ] [options]\n"
     "  mhe-sim follow CONFIG.yaml --input POSTURES.sto [--rate HZ] [options]\n"
+    "  mhe-sim reference CONFIG.yaml [options]\n"
     "  mhe-sim noise CONFIG.yaml [options]\n"
     "  mhe-sim --version | --help\n"
     "\n"
@@ -23,11 +25,15 @@ static const char help[] =
     "costs and solver find on the way. Both write reference.sto (the truth), markers.trc and\n"
     "emg.sto, HZ rows a second (default 100).\n"
     "\n"
+    "reference: optimal motions, the config's steps one after the other; for every step with an\n"
+    "output reference.sto, forces.sto, markers.trc and emg.sto in a folder of its own.\n"
+    "'mhe-sim reference --help' shows every key of a step.\n"
+    "\n"
     "noise: markers.trc and emg.sto as instruments with errors would have recorded them of such\n"
     "a reference.sto; noise.yaml says what was applied, noise.svg shows it.\n"
     "'mhe-sim noise --help' shows every key of its config.\n"
     "\n"
-    "  --out DIR                 default ./out/<config name>-sim, noise: ./out/<config name>\n"
+    "  --out DIR                 default ./out/<config name>; of a motion ./out/<config name>-sim\n"
     "  --set path.to.key=value   overrides the config\n"
     "Exit status: 0 done; 1 failed; 2 the command line or an input is wrong.\n";
 
@@ -85,6 +91,22 @@ static mhe_status run_noise(const call *c, mhe_error *err) {
     return status;
 }
 
+static mhe_status run_reference(const call *c, mhe_error *err) {
+    const arguments *a = c->arguments;
+    const reference_setup setup = {a->config, a->set, a->n_set, c->host, c->registry, a->out};
+    return reference_run(&setup, err);
+}
+
+static mhe_status help_reference(mhe_error *err) {
+    mhi_text text = {0};
+    reference_describe(&text);
+    (void)fputs("mhe-sim reference CONFIG.yaml [--out DIR] [--set path.to.key=value]...\n\n"
+                "The config has a list 'steps' in place of 'costs'; each step has a list 'costs' "
+                "and may have a\nlist 'bounds'.\n\n",
+                stdout);
+    return console_print(&text, err);
+}
+
 static mhe_status help_motion(mhe_error *err) {
     (void)err;
     (void)fputs(help, stdout);
@@ -107,6 +129,7 @@ static const struct command {
     mhe_status (*help)(mhe_error *err);
 } commands[] = {{"forward", 1, run_forward, help_motion},
                 {"follow", 1, run_follow, help_motion},
+                {"reference", 0, run_reference, help_reference},
                 {"noise", 0, run_noise, help_noise}};
 #define N_COMMANDS ((int32_t)(sizeof commands / sizeof commands[0]))
 

@@ -17,26 +17,28 @@
     "adapt_curvature: true, acceptable_tolerance: 1e-3, acceptable_iterations: 8, " \
     "options: {acceptable_obj_change_tol: 1e-9, acceptable_constr_viol_tol: 1e-7}}\n"
 #define TRACK "plugin: mhe.cost.track"
-#define COSTS                                                           \
-    "    costs:\n"                                                      \
-    "      - {" TRACK ", signal: excitation, value: [0], weight: 10}\n" \
-    "      - {" TRACK ", signal: activation, value: [0], weight: 10}\n" \
+#define COSTS                                                                     \
+    "    costs:\n"                                                                \
+    "      - {" TRACK ", signal: excitation, value: [0], weight: 10}\n"           \
+    "      - {" TRACK ", signal: q, value: [0], nodes: running, weight: 10}\n"    \
+    "      - {" TRACK ", signal: qdot, value: [0], nodes: running, weight: 10}\n" \
+    "      - {" TRACK ", signal: activation, value: [0], weight: 10}\n"           \
     "      - {" TRACK ", signal: qdot, value: [0], nodes: last, weight: 1e4}\n"
 #define REACH                                                             \
     "steps:\n"                                                            \
     "  - name: reach\n"                                                   \
-    "    duration: 0.5\n"                                                 \
-    "    intervals: 50\n"                                                 \
-    "    toward: [-0.2, -1.0, -0.5, 0.5]\n"                               \
+    "    duration: 1\n"                                                   \
+    "    intervals: 100\n"                                                \
+    "    toward: [-0.2, -1.3, -0.5, 0.5]\n"                               \
     "    bounds:\n"                                                       \
     "      - {signal: q, value: [-0.1, -0.3, -0.1, 0.1], to: 0}\n"        \
     "      - {signal: qdot, value: [0], to: 0}\n" COSTS "      - {" TRACK \
-    ", signal: q, value: [-0.2, -1.0, -0.5, 0.5], nodes: last, weight: 1e4}\n"
+    ", signal: q, value: [-0.2, -1.3, -0.5, 0.5], nodes: last, weight: 1e4}\n"
 #define TRICEPS "[TricepsLong, TricepsLat, TricepsMed]"
 #define AGAIN                                                                         \
     "  - name: again\n"                                                               \
-    "    duration: 0.5\n"                                                             \
-    "    intervals: 50\n"                                                             \
+    "    duration: 1\n"                                                               \
+    "    intervals: 100\n"                                                            \
     "    start: [reach]\n"                                                            \
     "    targets: {q: reach}\n"                                                       \
     "    bounds:\n"                                                                   \
@@ -108,7 +110,7 @@ static void close_problem(problem *p) {
 }
 
 static void check_reach(const mhi_trajectory *t) {
-    static const double from[] = {-0.1, -0.3, -0.1, 0.1}, to[] = {-0.2, -1.0, -0.5, 0.5};
+    static const double from[] = {-0.1, -0.3, -0.1, 0.1}, to[] = {-0.2, -1.3, -0.5, 0.5};
     const double *last = t->x + t->n * t->n_x;
     for (int i = 0; i < 4; i++) {
         assert_true(t->x[i] == from[i] && t->x[4 + i] == 0);
@@ -143,9 +145,10 @@ static void test_two_steps(void **state) {
         if (solve(&p, i) != MHE_OK) {
             fail_msg("%s", p.err.text);
         }
+        print_message("%s: outcome %d, %d iterations, residual %.3g\n", p.steps[i].name,
+                      (int)p.info.outcome, (int)p.info.iterations, p.info.kkt_residual);
         assert_int_equal(p.info.outcome, MHE_SOLVE_CONVERGED);
         assert_true(p.info.primal_residual < 1e-6);
-        print_message("%s: %d iterations\n", p.steps[i].name, (int)p.info.iterations);
     }
     check_reach(&p.done[0]);
     check_again(&p.done[1], &p.done[0]);

@@ -1,0 +1,90 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# mhe-sim reference on a short motion: files, consistency, and every kind of refusal.
+#   reference.sh PATH/mhe-sim SOURCE_DIR
+set -u
+sim=$1
+model=$2/models/arm19/arm19.osim
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failed=0
+
+fail() {
+    echo "FAILED $*"
+    failed=$((failed + 1))
+}
+
+write_config() {
+    cat > short.yaml << END
+model: {file: $model}
+muscle: {curves: paper2021}
+solver: {plugin: mhe.solver.ipopt, tolerance: 1e-6, max_iterations: 300, adapt_curvature: true, acceptable_tolerance: 1e-3,
+  acceptable_iterations: 8, options: {acceptable_obj_change_tol: 1e-9, acceptable_constr_viol_tol: 1e-7}}
+steps:
+  - name: reach
+    output: short
+    duration: 1
+    intervals: 100
+    toward: [-0.2, -1.3, -0.5, 0.5]
+    bounds:
+      - {signal: q, value: [-0.1, -0.3, -0.1, 0.1], to: 0}
+      - {signal: qdot, value: [0], to: 0}
+      - {signal: excitation, of: [BRA], min: [0.05]}
+    costs:
+      - {plugin: mhe.cost.track, signal: q, value: [0], nodes: running, weight: 10}
+      - {plugin: mhe.cost.track, signal: qdot, value: [0], nodes: running, weight: 10}
+      - {plugin: mhe.cost.track, signal: excitation, value: [0], weight: 10}
+      - {plugin: mhe.cost.track, signal: activation, value: [0], nodes: running, weight: 10}
+      - {plugin: mhe.cost.track, signal: qdot, value: [0], nodes: last, weight: 1e4}
+      - {plugin: mhe.cost.track, signal: q, value: [-0.2, -1.3, -0.5, 0.5], nodes: last, weight: 1e4}
+END
+}
+
+write_config
+"$sim" reference short.yaml --out result > out.txt 2> err.txt || fail "exit status $?: $(cat err.txt)"
+cat out.txt
+for file in reference.sto forces.sto markers.trc emg.sto; do
+    [ -s "result/short/$file" ] || fail "no $file"
+done
+find result -name '.*' -type f | grep . && fail "temporary files are left"
+# The feedback is small and leaves the motion on its solution.
+awk '/feedback up to/ { for (i = 1; i < NF; i++) {
+         if ($i == "up" && $(i + 2) + 0 < 5e-3) { small = 1 }
+         if ($i == "within" && $(i + 1) + 0 < 1e-4) { near = 1 } } }
+     END { exit !(small && near) }' out.txt || fail "the feedback: $(cat out.txt)"
+# 101 rows; it starts where the config says and ends near the target; excitations are those of emg.sto.
+awk -F '\t' '$1 == "time" { for (i = 1; i <= NF; i++) { column[$i] = i } next }
+     FNR > 6 && $1 + 0 == $1 { rows++; q = $column["q_Arm_RotX"]; if (rows == 1) { first = q } }
+     END { exit !(rows == 101 && first == -0.3 && q < -1.28 && q > -1.32) }' result/short/reference.sto ||
+    fail "rows or posture of reference.sto"
+[ "$(awk -F '\t' '$1 + 0 == $1 && NF > 5 { print $29 }' result/short/reference.sto)" = \
+    "$(awk -F '\t' '$1 + 0 == $1 && NF > 5 { print $2 }' result/short/emg.sto)" ] || fail "emg.sto is not the excitation"
+
+# expect NAME STATUS 'TEXT IN THE MESSAGE' 'SED SCRIPT'
+expect() {
+    write_config
+    sed -i "$4" short.yaml
+    rm -rf result
+    "$sim" reference short.yaml --out result > out.txt 2> err.txt < /dev/null
+    status=$?
+    if [ "$status" -ne "$2" ] || [ "$(grep -c . err.txt)" -ne 1 ] || [ -e result ]; then
+        fail "$1: status $status: $(cat err.txt)"
+    elif ! grep -qF -- "$3" err.txt; then
+        fail "$1: '$3' is not in: $(cat err.txt)"
+    fi
+}
+
+expect unknown-muscle 2 "step 'reach': bounds: 'excitation' has no entry 'BRE'" 's/\[BRA\]/[BRE]/'
+expect crossed-bounds 2 "leaves nothing" 's/min: \[0.05\]/min: [0.5], max: [0.4]/'
+expect unknown-step 2 "'other' is no step before this one" 's/    toward: .*/    start: [other]/'
+expect unknown-key 2 "did you mean 'intervals'" 's/    intervals:/    interval:/'
+expect unknown-signal 2 "no signal 'torque'" 's/signal: qdot, value: \[0\], nodes: last/signal: torque, nodes: last/'
+expect no-steps 2 'steps: a list' '/^steps/,$d'
+expect no-convergence 1 "step 'reach' did not converge in 3 iterations" 's/max_iterations: 300/max_iterations: 3/'
+expect impossible 1 "step 'reach'" "/signal: qdot, value: \[0\], to/a\\
+\      - {signal: q, value: [-0.2, -1.3, -0.5, 0.5], from: 0.02, to: 0.02}
+s/max_iterations: 300/max_iterations: 60/"
+
+[ $failed -eq 0 ] && echo "reference: all as it should be"
+[ $failed -eq 0 ]
