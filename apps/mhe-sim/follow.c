@@ -89,9 +89,9 @@ static void take_controls(follow *f, const mhe_estimate *estimate) {
 static mhe_status follow_path(follow *f, mhe_error *err) {
     simulation *s = &f->simulation;
     const mhi_table *p = f->postures;
-    const int32_t n = (int32_t)floor((p->time[p->n_rows - 1] - p->time[0]) * s->rate + 1e-6);
     const int32_t window = f->setup->run->horizon.window;
-    mhe_status status = MHE_OK;
+    int32_t n = 0;
+    mhe_status status = simulation_steps(s, p, &n, err);
     posture_at(f, p->time[0], f->q);
     memset(s->x_next, 0, sizeof(double) * (size_t)s->n_q);
     mhi_estimator_set_start(f->estimator, f->q, s->x_next);

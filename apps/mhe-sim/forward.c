@@ -5,7 +5,6 @@
 #include "motion.h"
 #include "simulation.h"
 
-#include <math.h>
 #include <string.h>
 
 typedef struct forward {
@@ -71,8 +70,11 @@ static mhe_status integrate(forward *f, mhe_error *err) {
     simulation *s = &f->simulation;
     const mhi_table *e = f->excitations;
     const double begin = e->time[0];
-    const int32_t n = (int32_t)floor((e->time[e->n_rows - 1] - begin) * s->rate + 1e-6);
-    mhe_status status = controls_at(f, begin, err);
+    int32_t n = 0;
+    mhe_status status = simulation_steps(s, e, &n, err);
+    if (status == MHE_OK) {
+        status = controls_at(f, begin, err);
+    }
     if (status == MHE_OK) {
         status = first_state(f, err);
     }

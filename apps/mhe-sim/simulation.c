@@ -4,9 +4,11 @@
 #include "config/options.h"
 #include "plugin/instance.h"
 
+#include <math.h>
 #include <string.h>
 
 #define PLANT "mhe.integrator.sundials"
+#define STEPS_MAX 10000000 /* a day at 100 Hz */
 
 static mhe_status open_integrator(simulation *s, const mhe_host *host, mhi_registry *registry,
                                   mhe_error *err) {
@@ -23,7 +25,7 @@ static mhe_status open_integrator(simulation *s, const mhe_host *host, mhi_regis
                               NULL, 0, plugin->id, s->run->dir, &s->arena, config, err);
     s->integrator = plugin->ops;
     if (status == MHE_OK) {
-        status = s->integrator->create(host, mhi_system_face(s->system), config,
+        status = mhi_integrator_create(plugin, host, mhi_system_face(s->system), config,
                                        &s->integrator_self, err);
     }
     if (status == MHE_OK) {
@@ -54,6 +56,17 @@ mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *
     }
     mhe_status status = mhi_system_context_create(system, &s->context, err);
     return status == MHE_OK ? open_integrator(s, host, registry, err) : status;
+}
+
+mhe_status simulation_steps(const simulation *s, const mhi_table *input, int32_t *n,
+                            mhe_error *err) {
+    const double span = input->time[input->n_rows - 1] - input->time[0];
+    if (!(span * s->rate < STEPS_MAX)) {
+        return mhe_fail(err, MHE_E_INPUT, "%s: %g s at %g Hz are more than %d steps", input->path,
+                        span, s->rate, STEPS_MAX);
+    }
+    *n = (int32_t)floor(span * s->rate + 1e-6);
+    return MHE_OK;
 }
 
 mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err) {

@@ -7,6 +7,7 @@
 #include "base/arena.h"
 #include "config/run.h"
 #include "io/sink.h"
+#include "io/table.h"
 #include "model/system.h"
 
 #include <mhe/integrator.h>
@@ -32,6 +33,9 @@ typedef struct simulation {
 mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *system,
                            const mhe_host *host, mhi_registry *registry, double rate,
                            mhe_error *err);
+/* Steps from the first to the last row of a table; MHE_E_INPUT: more than a file should hold. */
+mhe_status simulation_steps(const simulation *s, const mhi_table *input, int32_t *n,
+                            mhe_error *err);
 /* Opens reference.sto, markers.trc and emg.sto in the folder. */
 mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err);
 /* Writes state, controls, forces and markers at a time. */
