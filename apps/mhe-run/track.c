@@ -162,17 +162,20 @@ static mhe_status finish(tracking *t, mhe_error *err) {
 
 mhe_status track(const track_setup *setup, mhe_error *err) {
     tracking t = {.setup = setup};
-    struct sigaction action, before;
+    struct sigaction action, before[2];
     memset(&action, 0, sizeof action);
     action.sa_handler = on_interrupt;
+    action.sa_flags = (int)SA_RESETHAND; /* a second one ends the program at once */
     mhe_status status = open_all(&t, err);
     if (status == MHE_OK && !setup->check_only) {
-        (void)sigaction(SIGINT, &action, &before);
+        (void)sigaction(SIGINT, &action, &before[0]);
+        (void)sigaction(SIGTERM, &action, &before[1]);
         status = estimate_all(&t, err);
         if (status == MHE_OK) {
             status = finish(&t, err);
         }
-        (void)sigaction(SIGINT, &before, NULL);
+        (void)sigaction(SIGINT, &before[0], NULL);
+        (void)sigaction(SIGTERM, &before[1], NULL);
     }
     results_close(t.results);
     mhi_outbox_close(t.outbox);

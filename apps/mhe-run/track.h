@@ -13,8 +13,8 @@ typedef struct track_setup {
     int check_only; /* open everything, estimate nothing */
 } track_setup;
 
-/* MHE_E_INTERRUPTED: Ctrl-C; the files hold what was estimated until then. On any other failure no
- * file appears. */
+/* MHE_E_INTERRUPTED: Ctrl-C or SIGTERM; the files hold what was estimated until then. On any other
+ * failure no file appears. */
 mhe_status track(const track_setup *setup, mhe_error *err);
 
 #endif
