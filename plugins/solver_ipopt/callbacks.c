@@ -98,7 +98,7 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
     ipopt_solver *s = data;
     const mhe_solve_control *control = s->control;
     (void)mode, (void)mu, (void)d_norm, (void)regularization, (void)alpha_du, (void)trials;
-    s->curvature.full_step = alpha_pr == 1;
+    s->curvature.length = alpha_pr;
     s->iterations = iteration;
     s->kkt_residual = fmax(inf_pr, inf_du);
     s->nlp.all_next = 1;

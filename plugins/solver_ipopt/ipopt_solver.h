@@ -26,10 +26,11 @@ struct ipopt_config { /* filled from the option table of solver_ipopt.c */
 typedef struct ipopt_curvature {
     int32_t n;
     double factor;
-    int32_t full_step;    /* the last step was taken in full */
-    int32_t n_steps;      /* full steps with one factor */
-    double *point, *step; /* [n] the last iterate and the step that led to it; NULL: not
-                             adapted */
+    double factor_before;      /* of the step before the last */
+    double length;             /* of the last step, 1: in full; 0: none yet */
+    double length_before;      /* of the step before it */
+    double *point, *direction; /* [n] the last iterate and `factor` times the direction that led to
+                                  it; NULL: not adapted */
 } ipopt_curvature;
 
 typedef struct ipopt_solver {
