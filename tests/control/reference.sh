@@ -86,5 +86,13 @@ expect impossible 1 "step 'reach'" "/signal: qdot, value: \[0\], to/a\\
 \      - {signal: q, value: [-0.2, -1.3, -0.5, 0.5], from: 0.02, to: 0.02}
 s/max_iterations: 300/max_iterations: 60/"
 
+# The shipped config: its reaches, and that the rest of it is understood (the whole takes a minute).
+shipped=$2/models/arm19
+sed "s#arm19.osim#$model#; /2\. The whole motion/,\$d" "$shipped/reference.yaml" > reaches.yaml
+"$sim" reference reaches.yaml > out.txt 2> err.txt || fail "reaches of the shipped config: $(cat err.txt)"
+[ "$(grep -c iterations out.txt)" -eq 2 ] || fail "not two reaches: $(cat out.txt)"
+"$sim" reference "$shipped/reference.yaml" --set solver.max_iterations=1 > out.txt 2> err.txt
+[ $? -eq 1 ] && grep -qF "step 'there' did not converge in 1 iterations" err.txt || fail "shipped config: $(cat err.txt)"
+
 [ $failed -eq 0 ] && echo "reference: all as it should be"
 [ $failed -eq 0 ]
