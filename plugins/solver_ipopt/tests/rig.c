@@ -6,6 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#ifndef RIG_SOLVER /* tests of other solvers say which */
+#define RIG_SOLVER "mhe.solver.ipopt"
+#endif
+
 /* All values of an iterate: x and its two multipliers, u and its two, lambda. */
 static int size_of(const toy *t) {
     int N = t->problem.n_intervals, n_x = t->problem.n_x, n_u = t->problem.n_u;
@@ -14,7 +18,7 @@ static int size_of(const toy *t) {
 
 mhe_status rig_open(rig *r, toy *t, const char *yaml) {
     *r = (rig){.t = t};
-    const mhe_plugin *plugin = test_plugin("mhe.solver.ipopt", MHE_SOLVER_IFACE);
+    const mhe_plugin *plugin = test_plugin(RIG_SOLVER, MHE_SOLVER_IFACE);
     r->memory = calloc((size_t)size_of(t), sizeof(double));
     assert_non_null(plugin);
     assert_non_null(r->memory);

@@ -15,8 +15,8 @@ typedef struct rig {
     double *memory;
 } rig;
 
-/* Creates "mhe.solver.ipopt" with the options of a YAML mapping ("{tolerance: 1e-8}") on t; gives
- * the status of create(). */
+/* Creates "mhe.solver.ipopt" (or RIG_SOLVER) with the options of a YAML mapping ("{tolerance:
+ * 1e-8}") on t; gives the status of create(). */
 mhe_status rig_open(rig *r, toy *t, const char *yaml);
 void rig_close(rig *r);
 

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* kernels_body.h: the kernels, compiled once for each instruction set; KERNELS_TABLE and
+ * KERNELS_NAME say for which. */
+#include "kernels.h"
+
+#include <math.h>
+
+/* Four doubles, wherever they lie; narrower machines take two instructions each. */
+typedef double vec4 __attribute__((vector_size(32), aligned(8), may_alias));
+
+#define AT(p) (*(const vec4 *)(p))
+#define PUT(p) (*(vec4 *)(p))
+
+/* `rows` rows of C from column j on, 8 columns; `rows` is a constant once inlined. */
+__attribute__((always_inline)) static inline void block(int32_t rows, int32_t k, double alpha,
+                                                        const double *A, int32_t ld_a,
+                                                        const double *B, int32_t ld_b, double keep,
+                                                        double *C, int32_t ld_c) {
+    vec4 sum[4][2] = {{{0}}};
+    for (int32_t p = 0; p < k; p++) {
+        const vec4 left = AT(B + p * ld_b), right = AT(B + p * ld_b + 4);
+        const double *a = A + p * ld_a;
+        for (int32_t r = 0; r < rows; r++) {
+            sum[r][0] += a[r] * left;
+            sum[r][1] += a[r] * right;
+        }
+    }
+    for (int32_t r = 0; r < rows; r++) {
+        double *c = C + r * ld_c;
+        if (keep != 0) {
+            PUT(c) = AT(c) + alpha * sum[r][0];
+            PUT(c + 4) = AT(c + 4) + alpha * sum[r][1];
+        } else {
+            PUT(c) = alpha * sum[r][0];
+            PUT(c + 4) = alpha * sum[r][1];
+        }
+    }
+}
+
+static void product(int32_t m, int32_t n, int32_t k, double alpha, const double *A, int32_t ld_a,
+                    const double *B, int32_t ld_b, double keep, double *C, int32_t ld_c,
+                    int32_t upper) {
+    for (int32_t i = 0; i < m; i += 4) {
+        const int32_t rows = m - i;
+        for (int32_t j = upper ? i : 0; j < n; j += 8) {
+            const double *a = A + i, *b = B + j;
+            double *c = C + i * ld_c + j;
+            if (rows >= 4) {
+                block(4, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+            } else if (rows == 3) {
+                block(3, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+            } else if (rows == 2) {
+                block(2, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+            } else {
+                block(1, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+            }
+        }
+    }
+}
+
+static inline void subtract_row(int32_t from, int32_t n, double a, const double *x, double *y) {
+    for (int32_t j = from; j < n; j += 4) {
+        PUT(y + j) = AT(y + j) - a * AT(x + j);
+    }
+}
+
+/* Left-looking by blocks of four rows. */
+static int32_t factor(int32_t n, int32_t n_all, double *M, int32_t ld, double *inverse) {
+    for (int32_t i = 0; i < n; i += 4) {
+        const int32_t end = i + 4 < n ? i + 4 : n;
+        product(end - i, n_all - i, i, -1, M + i, ld, M + i, ld, 1, M + i * ld + i, ld, 0);
+        for (int32_t r = i; r < end; r++) {
+            double *row = M + r * ld;
+            for (int32_t p = i; p < r; p++) {
+                subtract_row(r, n_all, M[p * ld + r], M + p * ld, row);
+            }
+            if (!(row[r] > 0) || !isfinite(row[r])) {
+                return 0;
+            }
+            inverse[r] = 1 / sqrt(row[r]);
+            for (int32_t j = r; j < n_all; j += 4) {
+                PUT(row + j) = inverse[r] * AT(row + j);
+            }
+        }
+    }
+    return 1;
+}
+
+static void add_transposed(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
+                           const double *x, double *y) {
+    int32_t i = 0;
+    for (; i + 4 <= m; i += 4) {
+        const double *a = A + i * ld;
+        const double x0 = alpha * x[i], x1 = alpha * x[i + 1], x2 = alpha * x[i + 2],
+                     x3 = alpha * x[i + 3];
+        for (int32_t j = 0; j < n; j += 4) {
+            PUT(y + j) = AT(y + j) + (x0 * AT(a + j) + x1 * AT(a + ld + j)) +
+                         (x2 * AT(a + 2 * ld + j) + x3 * AT(a + 3 * ld + j));
+        }
+    }
+    for (; i < m; i++) {
+        subtract_row(0, n, -alpha * x[i], A + i * ld, y);
+    }
+}
+
+static void add(int32_t m, int32_t n, double alpha, const double *A, int32_t ld, const double *x,
+                double *y) {
+    for (int32_t i = 0; i < m; i++) {
+        vec4 sum = {0};
+        for (int32_t j = 0; j < n; j += 4) {
+            sum += AT(A + i * ld + j) * AT(x + j);
+        }
+        y[i] += alpha * ((sum[0] + sum[1]) + (sum[2] + sum[3]));
+    }
+}
+
+const kernels KERNELS_TABLE = {.name = KERNELS_NAME,
+                               .product = product,
+                               .factor = factor,
+                               .add_transposed = add_transposed,
+                               .add = add};

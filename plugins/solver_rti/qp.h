@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* qp.h: a staged quadratic program with bounds by a primal-dual interior-point method.
+ *
+ * Predictor and corrector of Mehrotra (1992, doi:10.1137/0802028) with one factorisation each
+ * iteration; slacks t of the bounds are variables of their own, so any start will do. Each Newton
+ * system is proximal in the variables and in the multipliers of bounds (weights `regularisation`
+ * and `softness`; Pougkakiotis and Gondzio 2021, doi:10.1007/s10589-020-00240-9): it stays solvable
+ * with flat directions and with bounds that the dynamics cannot meet, and the solution is not
+ * changed by it. */
+#ifndef QP_H
+#define QP_H
+
+#include "riccati.h"
+
+typedef struct qp_limits { /* largest residuals of a solved program */
+    double stationarity, feasibility, complementarity;
+    int32_t max_iterations;
+    double regularisation;
+} qp_limits;
+
+#define QP_SOLVED 0
+#define QP_LIMIT 1      /* iterations are used up */
+#define QP_INFEASIBLE 2 /* ... and bounds are violated: w violates them least */
+#define QP_FAILED 3     /* a Newton system could not be solved */
+
+/* One side of a bound: sign * (w[at] - bound) >= 0, or = 0 with slack 0. */
+typedef struct qp_side {
+    int32_t at;
+    double sign, bound;
+    double t, z;     /* slack and multiplier */
+    double dt, dz;   /* their steps */
+    double residual; /* sign * (w - bound) - t */
+    double weight;   /* of the step of w in that of z */
+    double shift;    /* ... and its constant part */
+} qp_side;
+
+typedef struct qp {
+    const qp_shape *shape;
+    const qp_stage *stages;
+    double *lower, *upper; /* [size_z] */
+    /* Start and result: variables [size_z], multipliers [size_x] of the dynamics and [size_z] of
+     * the bounds, signs as in solver.h. */
+    double *w, *lambda, *z_lower, *z_upper;
+    int32_t iterations;
+    double stationarity, feasibility, complementarity; /* residuals reached */
+
+    uint8_t *fixed; /* [size_z] controls and first states with equal bounds: constants */
+    qp_side *sides;
+    int32_t n_sides, n_inequalities; /* equalities (later states with equal bounds) come last */
+    double regularisation;           /* now */
+    int32_t refine;                  /* a Newton system needs a second solve */
+    double *slope, *gap;             /* residuals of w [size_z] and of the dynamics [size_x] */
+    double *diagonal, *rhs, *dw, *dlambda;        /* of a Newton system */
+    double *rest_w, *rest_x, *fix_w, *fix_lambda; /* of its refinement */
+    riccati riccati;
+} qp;
+
+size_t qp_size(const qp_shape *s); /* bytes, a multiple of 64 */
+void qp_place(qp *q, const qp_shape *s, void *memory);
+
+/* Reads which variables are fixed from lower and upper. */
+void qp_read_bounds(qp *q);
+/* Solves the program of `stages` from q->w ... (`warm`: with the multipliers); gives QP_*. */
+int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t warm);
+
+#endif

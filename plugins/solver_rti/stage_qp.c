@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "stage_qp.h"
+
+#include <string.h>
+
+/* Does row i of the dynamics hold its own state and one control at most? Which control goes to
+ * `control`. */
+static int32_t is_simple(const mhe_stage_problem *p, int32_t i, int32_t *control) {
+    *control = -1;
+    for (int32_t j = 0; j < p->n_x; j++) {
+        if (p->A_pattern[i * p->n_x + j] && j != i) {
+            return 0;
+        }
+    }
+    for (int32_t j = 0; j < p->n_u; j++) {
+        if (p->B_pattern[i * p->n_u + j]) {
+            if (*control >= 0) {
+                return 0;
+            }
+            *control = j;
+        }
+    }
+    return 1;
+}
+
+void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape *shape) {
+    const int32_t n_x = problem->n_x, n_u = problem->n_u;
+    *shape = (qp_shape){.N = problem->n_intervals,
+                        .n_x = n_x,
+                        .n_u = n_u,
+                        .n_z = n_x + n_u,
+                        .ld_z = KERNEL_LD(n_x + n_u),
+                        .ld_x = KERNEL_LD(n_x),
+                        .n_dense = n_x,
+                        .control_of = control_of,
+                        .kernels = kernels_best()};
+    while (shape->n_dense > 0 &&
+           is_simple(problem, shape->n_dense - 1, &control_of[shape->n_dense - 1])) {
+        shape->n_dense--;
+    }
+}
+
+size_t qp_stages_size(const qp_shape *s) {
+    const size_t matrices = (size_t)(s->n_z + s->n_dense) * (size_t)s->ld_z;
+    return (size_t)(s->N + 1) * (matrices + (size_t)s->ld_z + 3 * (size_t)s->ld_x);
+}
+
+void qp_stages_place(const qp_shape *s, double *memory, qp_stage *stages) {
+    memset(memory, 0, sizeof(double) * qp_stages_size(s));
+    for (int32_t k = 0; k <= s->N; k++) {
+        qp_stage *stage = &stages[k];
+        stage->H = memory;
+        stage->F = stage->H + s->n_z * s->ld_z;
+        stage->g = stage->F + s->n_dense * s->ld_z;
+        stage->by_state = stage->g + s->ld_z;
+        stage->by_control = stage->by_state + s->ld_x;
+        stage->b = stage->by_control + s->ld_x;
+        memory = stage->b + s->ld_x;
+    }
+}
+
+void qp_forward(const qp_shape *s, const qp_stage *stage, const double *w, double *next) {
+    s->kernels->add(s->n_dense, s->n_z, 1, stage->F, s->ld_z, w, next);
+    for (int32_t i = s->n_dense; i < s->n_x; i++) {
+        next[i] += stage->by_state[i] * w[s->n_u + i];
+        if (s->control_of[i] >= 0) {
+            next[i] += stage->by_control[i] * w[s->control_of[i]];
+        }
+    }
+}
+
+void qp_backward(const qp_shape *s, const qp_stage *stage, double alpha, const double *lambda,
+                 double *w_out) {
+    s->kernels->add_transposed(s->n_dense, s->n_z, alpha, stage->F, s->ld_z, lambda, w_out);
+    for (int32_t i = s->n_dense; i < s->n_x; i++) {
+        w_out[s->n_u + i] += alpha * stage->by_state[i] * lambda[i];
+        if (s->control_of[i] >= 0) {
+            w_out[s->control_of[i]] += alpha * stage->by_control[i] * lambda[i];
+        }
+    }
+}
+
+void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
+              double *out) {
+    for (int32_t k = 0; k <= s->N; k++) {
+        double *slope = out + (ptrdiff_t)k * s->ld_z;
+        memcpy(slope, stages[k].g, sizeof(double) * (size_t)s->ld_z);
+        if (w != NULL) {
+            s->kernels->add_transposed(s->n_z, s->n_z, 1, stages[k].H, s->ld_z,
+                                       w + (ptrdiff_t)k * s->ld_z, slope);
+        }
+        for (int32_t i = 0; k > 0 && i < s->n_x; i++) {
+            slope[s->n_u + i] += lambda[(ptrdiff_t)(k - 1) * s->ld_x + i];
+        }
+        if (k < s->N) {
+            qp_backward(s, &stages[k], -1, lambda + (ptrdiff_t)k * s->ld_x, slope);
+        }
+    }
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* stage_qp.h: a quadratic program in stages, and where its numbers lie.
+ *
+ *     minimise   sum_{k=0}^{N} 1/2 w_k^T H_k w_k + g_k^T w_k              w_k = (u_k, x_k)
+ *     subject to x_{k+1} = F_k w_k + b_k,  lower_k <= w_k <= upper_k      F_k = [B_k A_k]
+ *
+ * At the last stage the part of u is there but empty. Vectors of all w have rows of ld_z doubles,
+ * those of states rows of ld_x; everything behind n_z or n_x is zero. */
+#ifndef STAGE_QP_H
+#define STAGE_QP_H
+
+#include "kernels.h"
+
+#include <mhe/solver.h>
+
+typedef struct qp_shape {
+    int32_t N, n_x, n_u, n_z; /* n_z = n_u + n_x */
+    int32_t ld_z, ld_x;
+    /* States from n_dense on depend on themselves and on one control at most (activations), or on
+     * none. */
+    int32_t n_dense;
+    const int32_t *control_of; /* [n_x]; -1: none */
+    const kernels *kernels;
+} qp_shape;
+
+/* One stage. */
+typedef struct qp_stage {
+    double *H; /* [n_z x ld_z], symmetric, both triangles */
+    double *F; /* first n_dense rows [n_dense x ld_z] */
+    double *by_state,
+        *by_control; /* the other rows: factors of the state and of its control [n_x] */
+    double *g;       /* [ld_z] */
+    double *b;       /* [ld_x] */
+} qp_stage;
+
+/* Rows of a stage's vectors. */
+static inline double *row_z(const qp_shape *s, double *w, int32_t k) {
+    return w + (ptrdiff_t)k * s->ld_z;
+}
+static inline double *row_x(const qp_shape *s, double *w, int32_t k) {
+    return w + (ptrdiff_t)k * s->ld_x;
+}
+/* Doubles of such vectors over all stages. */
+static inline size_t size_z(const qp_shape *s) {
+    return (size_t)(s->N + 1) * (size_t)s->ld_z;
+}
+static inline size_t size_x(const qp_shape *s) {
+    return (size_t)(s->N + 1) * (size_t)s->ld_x;
+}
+
+/* Sizes and structure of a problem; control_of [n_x] is the caller's memory. */
+void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape *shape);
+/* Doubles of all stages' matrices and vectors; hands them out from `memory`, zeroed. */
+size_t qp_stages_size(const qp_shape *s);
+void qp_stages_place(const qp_shape *s, double *memory, qp_stage *stages);
+
+/* next [n_x] += F w, and w_out [n_z] += alpha F^T lambda. */
+void qp_forward(const qp_shape *s, const qp_stage *stage, const double *w, double *next);
+void qp_backward(const qp_shape *s, const qp_stage *stage, double alpha, const double *lambda,
+                 double *w_out);
+/* Slope of the Lagrangian without bounds: out = H w + g + (lambda_{k-1} on x) - F^T lambda_k, all
+ * stages. `w` NULL: 0. */
+void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
+              double *out);
+
+#endif

@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* step.c: from one iterate to the next. */
+#include "rti.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MAX_HALVINGS 8
+#define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
+#define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
+#define MOST_DAMPING 1e9
+
+/* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
+ * closely: what is left of them, times large multipliers, is noise in the merit function. */
+static int32_t solve_program(rti_solver *s, int32_t from_last) {
+    qp *q = &s->qp;
+    const size_t n = size_z(&s->shape);
+    const qp_limits limits = {.stationarity = 0.1 * s->config->tolerance,
+                              .feasibility = fmax(1e-4 * s->config->tolerance, 1e-12),
+                              .complementarity = 0.01 * s->config->tolerance,
+                              .max_iterations = s->config->max_qp_iterations,
+                              .regularisation = 1e-9};
+    for (size_t i = 0; i < n; i++) {
+        q->lower[i] = s->lower[i] - s->here.w[i];
+        q->upper[i] = s->upper[i] - s->here.w[i];
+    }
+    if (!from_last) {
+        memset(q->w, 0, sizeof(double) * n);
+        memcpy(q->lambda, s->lambda, sizeof(double) * size_x(&s->shape));
+        memcpy(q->z_lower, s->z_lower, sizeof(double) * n);
+        memcpy(q->z_upper, s->z_upper, sizeof(double) * n);
+    }
+    return qp_solve(q, s->here.stages, &limits, s->warm);
+}
+
+/* trial.w = here.w + length * step, within the bounds; its longest component. */
+static double reach(rti_solver *s, double length) {
+    double longest = 0;
+    for (size_t i = 0; i < size_z(&s->shape); i++) {
+        const double w = s->here.w[i] + length * s->qp.w[i];
+        s->trial.w[i] = fmin(fmax(w, s->lower[i]), s->upper[i]);
+        longest = fmax(longest, fabs(s->trial.w[i] - s->here.w[i]));
+    }
+    return longest;
+}
+
+static void blend(double length, size_t n, const double *to, double *from) {
+    for (size_t i = 0; i < n; i++) {
+        from[i] += length * (to[i] - from[i]);
+    }
+}
+
+/* The trial point becomes `here`. */
+static void accept(rti_solver *s, double length) {
+    const size_t n = size_z(&s->shape);
+    const rti_point old = s->here;
+    s->here = s->trial;
+    s->trial = old;
+    blend(length, size_x(&s->shape), s->qp.lambda, s->lambda);
+    blend(length, n, s->qp.z_lower, s->z_lower);
+    blend(length, n, s->qp.z_upper, s->z_upper);
+    s->warm = 1;
+}
+
+int32_t rti_step_full(rti_solver *s, int32_t last) {
+    rti_set_damping(s, &s->here, s->config->regularisation);
+    if (solve_program(s, 0) == QP_FAILED) {
+        return RTI_STUCK;
+    }
+    double length = 1;
+    for (int32_t i = 0; i <= MAX_HALVINGS; i++, length /= 2) {
+        const double longest = reach(s, length);
+        if (rti_evaluate(s, &s->trial, !last)) {
+            accept(s, length);
+            return i == 0 && longest <= s->config->tolerance ? RTI_SMALL : RTI_MOVED;
+        }
+        if (s->failure != MHE_OK) {
+            break;
+        }
+    }
+    return RTI_STUCK;
+}
+
+/* ---- globalised by an exact penalty: merit = cost + penalty * sum |gap| ---- */
+
+static double merit(const rti_solver *s, const rti_point *point) {
+    return point->cost + s->penalty * rti_gap_sum(s, point);
+}
+
+/* Slope of the merit function along the step; raises the penalty above the multipliers first. */
+static double merit_slope(rti_solver *s) {
+    double largest = 0, slope = 0;
+    for (size_t i = 0; i < size_x(&s->shape); i++) {
+        largest = fmax(largest, fabs(s->qp.lambda[i]));
+    }
+    if (s->penalty < 1.1 * largest) {
+        s->penalty = 1.5 * largest;
+    }
+    for (int32_t k = 0; k <= s->shape.N; k++) {
+        const double *step = row_z(&s->shape, s->qp.w, k);
+        for (int32_t i = 0; i < s->shape.n_z; i++) {
+            slope += s->here.stages[k].g[i] * step[i];
+        }
+    }
+    return fmin(slope - s->penalty * s->gap_sum, 0);
+}
+
+/* Is the trial point good enough after this length? Its merit must be known. */
+static int32_t is_better(const rti_solver *s, double length, double slope) {
+    const double before = merit(s, &s->here);
+    return merit(s, &s->trial) <= before + ARMIJO * length * slope + 1e-12 * (1 + fabs(before));
+}
+
+/* A second look at a full step that was refused: the program once more with the gaps that the step
+ * left (second-order correction: Fletcher 1982; the penalty function else refuses good steps along
+ * curved constraints, the Maratos effect). The refused point's gaps are in trial. */
+static int32_t second_look(rti_solver *s, double slope) {
+    const qp_shape *shape = &s->shape;
+    const size_t bytes = sizeof(double) * (size_t)shape->n_x;
+    for (int32_t k = 0; k < shape->N; k++) {
+        double *b = s->here.stages[k].b;
+        memcpy(row_x(shape, s->gaps, k), b, bytes);
+        for (int32_t i = 0; i < shape->n_x; i++) {
+            b[i] += s->trial.stages[k].b[i];
+        }
+    }
+    const int32_t result = solve_program(s, 1);
+    for (int32_t k = 0; k < shape->N; k++) {
+        memcpy(s->here.stages[k].b, row_x(shape, s->gaps, k), bytes);
+    }
+    if (result == QP_SOLVED) {
+        (void)reach(s, 1);
+        if (rti_evaluate(s, &s->trial, 1) && is_better(s, 1, slope)) {
+            return 1;
+        }
+    }
+    (void)solve_program(s, 0); /* the first step again, to be shortened */
+    return 0;
+}
+
+/* Shortens the step until the merit function is better; the length, 0: none found. The point is
+ * then known with derivatives. */
+static double search(rti_solver *s, double slope) {
+    double length = 0.5;
+    for (int32_t i = 0; i < MAX_HALVINGS; i++, length /= 2) {
+        (void)reach(s, length);
+        if (rti_evaluate(s, &s->trial, 0) && is_better(s, length, slope)) {
+            return rti_evaluate(s, &s->trial, 1) ? length : 0;
+        }
+        if (s->failure != MHE_OK) {
+            return 0;
+        }
+    }
+    return 0;
+}
+
+/* Levenberg's term follows how well the linearisation predicted: none while full steps go well. */
+static void adapt_damping(rti_solver *s, double length) {
+    if (length == 1) {
+        s->damping = s->damping > LEAST_DAMPING ? s->damping / 4 : 0;
+    } else if (length < 0.25) {
+        s->damping = fmax(4 * s->damping, LEAST_DAMPING);
+    }
+}
+
+/* Tries the step of a solved program; the part of it that was gone, 0: none. */
+static double try_step(rti_solver *s, int32_t result) {
+    const double slope = merit_slope(s);
+    (void)reach(s, 1);
+    const int32_t known = rti_evaluate(s, &s->trial, 1);
+    if (known && is_better(s, 1, slope)) {
+        return 1;
+    }
+    if (known && result == QP_SOLVED && second_look(s, slope)) {
+        return 1;
+    }
+    return s->failure == MHE_OK ? search(s, slope) : 0;
+}
+
+int32_t rti_step_globalised(rti_solver *s) {
+    while (s->damping <= MOST_DAMPING) {
+        rti_set_damping(s, &s->here, s->config->regularisation + s->damping);
+        const int32_t result = solve_program(s, 0);
+        const double before = s->gap_sum;
+        const double length = result == QP_FAILED ? 0 : try_step(s, result);
+        if (length > 0) {
+            accept(s, length);
+            adapt_damping(s, length);
+            const int32_t stays = rti_gap_sum(s, &s->here) > 0.9 * before;
+            return result == QP_INFEASIBLE && stays ? RTI_INFEASIBLE : RTI_MOVED;
+        }
+        if (s->failure != MHE_OK) {
+            break;
+        }
+        if (result == QP_INFEASIBLE) {
+            return RTI_INFEASIBLE;
+        }
+        s->damping = fmax(10 * s->damping, LEAST_DAMPING);
+    }
+    return RTI_STUCK;
+}
