@@ -62,6 +62,11 @@ static mhe_status open_all(reference *r, mhe_error *err) {
     return status;
 }
 
+static mhe_status interruption(const mhi_step *step, mhe_error *err) {
+    return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted in step '%s'; nothing is written",
+                    step->name);
+}
+
 static mhe_status judge(const reference *r, const mhi_step *step, const mhe_solve_info *info,
                         mhe_error *err) {
     static const char *const advice[] = {
@@ -75,7 +80,7 @@ static mhe_status judge(const reference *r, const mhi_step *step, const mhe_solv
         return MHE_OK;
     }
     if (info->outcome == MHE_SOLVE_INTERRUPTED) {
-        return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted in step '%s'", step->name);
+        return interruption(step, err);
     }
     return mhi_fail_at(err, MHE_E_NUMERIC, r->run->tree, step->node,
                        "step '%s' did not converge in %d iterations (residual %.3g, jumps %.3g): "
@@ -144,6 +149,9 @@ static mhe_status integrate(reference *r, int32_t number, mhe_error *err) {
     char folder[4096];
     if (!has_output(step)) {
         return MHE_OK;
+    }
+    if (interrupted) {
+        return interruption(step, err);
     }
     (void)snprintf(folder, sizeof folder, "%s%s/%s", r->setup->out == NULL ? "out/" : "",
                    r->setup->out == NULL ? r->run->name : r->setup->out, step->output);

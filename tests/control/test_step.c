@@ -2,6 +2,7 @@
 /* Optimal-control problems from a config: two short steps on the arm, and what is refused. */
 #include "control/step.h"
 #include "estimator/create.h"
+#include "io/table.h"
 #include "support.h"
 
 #include <math.h>
@@ -155,6 +156,44 @@ static void test_two_steps(void **state) {
     close_problem(&p);
 }
 
+/* The first half second of the demo's motion, from its file. */
+#define FROM_FILE                                                                        \
+    "steps:\n"                                                                           \
+    "  - name: demo\n"                                                                   \
+    "    duration: 0.5\n"                                                                \
+    "    intervals: 50\n"                                                                \
+    "    bounds: [{signal: q, value: [-0.09847, -0.29692, -0.10238, 0.10685], to: 0}]\n" \
+    "    targets: {q: " MHE_TEST_SOURCE_DIR "/models/arm19/demo_reference.sto}\n"        \
+    "    costs:\n"                                                                       \
+    "      - {" TRACK ", signal: q, weight: 1e7}\n"                                      \
+    "      - {" TRACK ", signal: excitation, value: [0], weight: 10}\n"                  \
+    "      - {" TRACK ", signal: activation, value: [0], weight: 10}\n"
+
+static void test_target_from_file(void **state) {
+    (void)state;
+    problem p;
+    mhi_table *file = NULL;
+    assert_int_equal(
+        mhi_sto_read(MHE_TEST_SOURCE_DIR "/models/arm19/demo_reference.sto", &file, NULL), MHE_OK);
+    assert_int_equal(open_problem(&p, HEAD FROM_FILE), MHE_OK);
+    if (solve(&p, 0) != MHE_OK) {
+        fail_msg("%s", p.err.text);
+    }
+    assert_int_equal(p.info.outcome, MHE_SOLVE_CONVERGED);
+    double worst = 0;
+    for (int k = 0; k <= 50; k++) {
+        for (int i = 0; i < 4; i++) {
+            const double q = file->values[k * file->n_columns + i];
+            worst = fmax(worst, fabs(p.done[0].x[k * p.done[0].n_x + i] - q));
+        }
+    }
+    print_message("demo: %d iterations, off by %.2g rad\n", (int)p.info.iterations, worst);
+    assert_true(fabs(file->values[50 * file->n_columns + 1] - file->values[1]) > 0.05);
+    assert_true(worst < 2e-3);
+    mhi_table_free(file);
+    close_problem(&p);
+}
+
 /* Motions one behind the other: a node is a node, a control holds, the ends stand still. */
 static void test_joined(void **state) {
     (void)state;
@@ -222,8 +261,8 @@ static void test_refused(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_two_steps),
-                                       cmocka_unit_test(test_joined),
-                                       cmocka_unit_test(test_refused)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(test_two_steps), cmocka_unit_test(test_target_from_file),
+        cmocka_unit_test(test_joined), cmocka_unit_test(test_refused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
