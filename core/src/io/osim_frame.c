@@ -5,8 +5,8 @@
 
 #include <string.h>
 
-#define FRAMES_DEEP 100 /* frames fixed to frames; a file of nothing else would exhaust the stack \
-                         */
+/* Frames fixed to frames; a file of nothing else would exhaust the stack. */
+#define FRAMES_DEEP 100
 
 #define FRAME(o, i) ((mhi_osim_frame *)(o)->frames.items[i])
 
