@@ -45,3 +45,11 @@ mhe_status console_print(mhi_text *text, mhe_error *err) {
     mhi_text_free(text);
     return status;
 }
+
+mhe_status console_value(int argc, char **argv, int *i, const char **value, mhe_error *err) {
+    if (*i + 1 >= argc || argv[*i + 1][0] == '\0') {
+        return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", argv[*i]);
+    }
+    *value = argv[++*i];
+    return MHE_OK;
+}

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* console.h: what the programs share: messages on stderr, exit status, printing. */
+/* console.h: what the programs share: messages on stderr, exit status, printing,
+ * the command line's words. */
 #ifndef CONSOLE_H
 #define CONSOLE_H
 
@@ -15,5 +16,8 @@ int console_exit_status(mhe_status status);
 
 /* Prints and frees a text; MHE_E_IO where it can not be written. */
 mhe_status console_print(mhi_text *text, mhe_error *err);
+
+/* The word behind the option argv[*i], which becomes the current one. MHE_E_ARGUMENT: none. */
+mhe_status console_value(int argc, char **argv, int *i, const char **value, mhe_error *err);
 
 #endif

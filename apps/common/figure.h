@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* figure.h: small multiples over time, drawn by gnuplot: blocks of panels under headings, four a
- * row, one legend, one look. */
+/* figure.h: small multiples over time (or another quantity), drawn by gnuplot: blocks of panels
+ * under headings, four a row, one legend, one look. */
 #ifndef FIGURE_H
 #define FIGURE_H
 
@@ -15,7 +15,8 @@
 #define FIGURE_TRUE 2   /* what is true: red, dashed */
 #define FIGURE_SHADES 4 /* 4, 5 ... 7: light to dark, for an ordered few */
 
-/* Values stand `stride` apart; what is not finite breaks the line. Lent to the figure. */
+/* Values stand `stride` apart; what is not finite breaks the line; few have dots. Lent
+ * to the figure. */
 typedef struct figure_series {
     const double *time, *values; /* [n] */
     int32_t n, stride;
@@ -31,15 +32,18 @@ typedef struct figure_panel {
 
 typedef struct figure_block {
     char heading[96];
-    const char *axis;   /* "force (N)" */
-    double least;       /* an axis is no narrower than this */
-    int32_t holds_zero; /* every axis shows 0 */
+    const char *axis;    /* "force (N)" */
+    double least;        /* an axis is no narrower than this */
+    int32_t holds_zero;  /* every axis shows 0 */
+    int32_t logarithmic; /* one logarithmic axis, the same for all its panels */
     int32_t n_panels;
 } figure_block;
 
 typedef struct figure {
     const char *program, *name; /* name.gp makes name.svg */
-    double begin, end;          /* s */
+    const char *abscissa;       /* NULL: "time (s)" */
+    int32_t per_row;            /* panels; 0: four. Fewer are wider and higher */
+    double begin, end;          /* of the abscissa, s */
     figure_block blocks[FIGURE_BLOCKS_MAX];
     figure_panel panels[FIGURE_PANELS_MAX]; /* block by block */
     struct {

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 
-#define PER_ROW 4
+#define DOTS_MAX 30
 #define POINTS_MAX 1500 /* a line: more cannot be seen at this size */
 
 /* Sizes in pixels. */
@@ -19,15 +19,22 @@
 #define TOP 34
 #define BLOCK_TOP 54 /* heading of a block and the names of its first row */
 #define BLOCK_END 66 /* time axis */
-#define PANEL_X ((WIDTH - LEFT - RIGHT - (PER_ROW - 1) * GAP_X) / PER_ROW)
 
-static int32_t rows_of(int32_t panels) {
-    return (panels + PER_ROW - 1) / PER_ROW;
+static int32_t per_row(const figure *f) {
+    return f->per_row > 0 ? f->per_row : 4;
 }
 
-static int32_t block_height(int32_t panels) {
-    int32_t rows = rows_of(panels);
-    return rows == 0 ? 0 : BLOCK_TOP + rows * PANEL_Y + (rows - 1) * GAP_Y + BLOCK_END;
+static int32_t panel_width(const figure *f) {
+    return (WIDTH - LEFT - RIGHT - (per_row(f) - 1) * GAP_X) / per_row(f);
+}
+
+static int32_t panel_height(const figure *f) {
+    return per_row(f) < 4 ? 2 * PANEL_Y : PANEL_Y;
+}
+
+static int32_t block_height(const figure *f, int32_t panels) {
+    int32_t rows = (panels + per_row(f) - 1) / per_row(f);
+    return rows == 0 ? 0 : BLOCK_TOP + rows * panel_height(f) + (rows - 1) * GAP_Y + BLOCK_END;
 }
 
 typedef struct range {
@@ -71,6 +78,24 @@ static void add_axis(mhi_text *script, range y, double least) {
     double upper = step * ceil((middle + 1.02 * half) / step);
     mhi_text_add(script, "set yrange [%.9g:%.9g]\nset ytics %.9g\n",
                  y.lower >= 0 && lower < 0 ? 0 : lower, upper, step);
+}
+
+/* A logarithmic axis over `y` from and to 1, 2 or 5 of a decade, with these as its steps. */
+static void add_decades(mhi_text *script, range y) {
+    static const double steps[] = {1, 2, 5};
+    if (!(y.lower <= y.upper) || !(y.lower > 0)) { /* nothing that it could show */
+        y = (range){1, 10};
+    }
+    double lower = 0, upper = 0;
+    mhi_text_add(script, "set logscale y\nset ytics (");
+    for (int32_t i = 3 * (int32_t)floor(log10(y.lower)); upper <= y.upper; i++) {
+        const int32_t decade = (i < 0 ? i - 2 : i) / 3;
+        upper = steps[i - 3 * decade] * pow(10, decade);
+        lower = upper <= y.lower ? upper : lower;
+        mhi_text_add(script, "%.9g%s", upper, upper > y.upper ? "" : ",");
+    }
+    lower *= 1 - 1e-6; /* gnuplot's own rounding would lose the lowest step */
+    mhi_text_add(script, ")\nset yrange [%.9g:%.9g]\n", lower, upper);
 }
 
 /* Text of a gnuplot string in single quotes. */
@@ -134,31 +159,47 @@ typedef struct place {
     int32_t first, top;
 } place;
 
+/* Few computed values are shown one by one. */
+static int dotted(const figure_series *line) {
+    return line->style == FIGURE_MADE && line->n <= DOTS_MAX;
+}
+
 static void add_panel(const figure *f, const figure_block *block, place at, int32_t number,
                       int32_t height, range values, mhi_text *script) {
     const figure_panel *panel = &f->panels[number];
-    int32_t position = number - at.first, column = position % PER_ROW, row = position / PER_ROW;
-    const int32_t left = LEFT + column * (PANEL_X + GAP_X);
-    const double x = left, y = at.top + BLOCK_TOP + row * (PANEL_Y + GAP_Y);
+    const int32_t wide = panel_width(f), high = panel_height(f);
+    int32_t position = number - at.first, column = position % per_row(f),
+            row = position / per_row(f);
+    const int32_t left = LEFT + column * (wide + GAP_X);
+    const double x = left, y = at.top + BLOCK_TOP + row * (high + GAP_Y);
     mhi_text_add(script, "set lmargin at screen %.5f\nset rmargin at screen %.5f\n", x / WIDTH,
-                 (double)(left + PANEL_X) / WIDTH);
+                 (double)(left + wide) / WIDTH);
     mhi_text_add(script, "set tmargin at screen %.5f\nset bmargin at screen %.5f\n", 1 - y / height,
-                 1 - (y + PANEL_Y) / height);
+                 1 - (y + high) / height);
     mhi_text_add(script, "set title ");
     add_quoted(script, panel->name);
     mhi_text_add(script, " noenhanced offset 0,-0.6 font ',12'\n");
     if (column == 0) {
         mhi_text_add(script, "set label '%s' at", block->axis);
-        add_point(script, 16, y + PANEL_Y / 2.0, height);
+        add_point(script, 16, y + high / 2.0, height);
         mhi_text_add(script, " center rotate\n");
     }
-    int32_t is_lowest = position + PER_ROW >= block->n_panels;
-    mhi_text_add(script, is_lowest ? "set xlabel 'time (s)' offset 0,0.6\nset format x\n"
-                                   : "unset xlabel\nset format x ''\n");
-    add_axis(script, values, block->least);
+    if (position + per_row(f) >= block->n_panels) { /* the lowest of its column */
+        mhi_text_add(script, "set xlabel '%s' offset 0,0.6\nset format x\n",
+                     f->abscissa != NULL ? f->abscissa : "time (s)");
+    } else {
+        mhi_text_add(script, "unset xlabel\nset format x ''\n");
+    }
+    if (block->logarithmic) {
+        add_decades(script, values);
+    } else {
+        add_axis(script, values, block->least);
+    }
     for (int32_t i = 0; i < panel->n_series; i++) {
-        mhi_text_add(script, "%s $line%d_%d using 1:2 with lines ls %d", i == 0 ? "plot" : ",",
-                     number, i, panel->series[i].style);
+        const int dots = dotted(&panel->series[i]);
+        mhi_text_add(script, "%s $line%d_%d using 1:2 with %s ls %d%s", i == 0 ? "plot" : ",",
+                     number, i, dots ? "linespoints" : "lines", panel->series[i].style,
+                     dots ? " pt 7 ps 0.5" : "");
     }
     mhi_text_add(script, "\nunset label\nunset arrow\n");
 }
@@ -171,6 +212,17 @@ static void add_legends(const figure *f, int32_t height, mhi_text *script) {
     }
 }
 
+/* Gives n panels what all of them hold. */
+static void share_range(range *y, int32_t n) {
+    range all = {INFINITY, -INFINITY};
+    for (int32_t i = 0; i < n; i++) {
+        all = (range){fmin(all.lower, y[i].lower), fmax(all.upper, y[i].upper)};
+    }
+    for (int32_t i = 0; i < n; i++) {
+        y[i] = all;
+    }
+}
+
 void figure_script(const figure *f, mhi_text *script) {
     mhi_c_locale locale = mhi_c_locale_begin();
     range y[FIGURE_PANELS_MAX];
@@ -178,7 +230,7 @@ void figure_script(const figure *f, mhi_text *script) {
     int32_t height = TOP, n_panels = 0;
     for (int32_t b = 0; b < f->n_blocks; b++) {
         at[b] = (place){n_panels, height};
-        height += block_height(f->blocks[b].n_panels);
+        height += block_height(f, f->blocks[b].n_panels);
         n_panels += f->blocks[b].n_panels;
     }
     add_look(script, f, height);
@@ -189,6 +241,9 @@ void figure_script(const figure *f, mhi_text *script) {
             for (int32_t k = 0; k < f->panels[i].n_series; k++) {
                 add_data(script, f, i, k, &y[i]);
             }
+        }
+        if (block->logarithmic) {
+            share_range(y + at[b].first, block->n_panels);
         }
     }
     for (int32_t b = 0; b < f->n_blocks; b++) { /* before the first panel takes its labels away */

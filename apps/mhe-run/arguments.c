@@ -2,6 +2,7 @@
 #include "arguments.h"
 
 #include "base/text.h"
+#include "console.h"
 #include "plugin/registry.h"
 
 #include <stdlib.h>
@@ -25,30 +26,21 @@ static const char *const words[] = {"--out",          "--set",  "--quiet",    "-
                                     "--list-plugins", "--json", "--markdown", "--describe",
                                     "--version",      "--help"};
 
-/* The word behind an option. */
-static mhe_status value_of(int argc, char **argv, int *i, const char **value, mhe_error *err) {
-    if (*i + 1 >= argc || argv[*i + 1][0] == '\0') {
-        return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", argv[*i]);
-    }
-    *value = argv[++*i];
-    return MHE_OK;
-}
-
 static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_error *err) {
     const char *word = argv[*i];
     if (strcmp(word, "--out") == 0) {
-        return value_of(argc, argv, i, &a->out, err);
+        return console_value(argc, argv, i, &a->out, err);
     }
     if (strcmp(word, "--set") == 0) {
-        return value_of(argc, argv, i, &a->set[a->n_set++], err);
+        return console_value(argc, argv, i, &a->set[a->n_set++], err);
     }
     if (strcmp(word, "--check") == 0) {
         a->mode = MODE_CHECK;
-        return value_of(argc, argv, i, &a->config, err);
+        return console_value(argc, argv, i, &a->config, err);
     }
     if (strcmp(word, "--describe") == 0) {
         a->mode = MODE_DESCRIBE;
-        return value_of(argc, argv, i, &a->id, err);
+        return console_value(argc, argv, i, &a->id, err);
     }
     if (strcmp(word, "--quiet") == 0) {
         a->quiet = 1;

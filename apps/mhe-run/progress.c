@@ -1,25 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "progress.h"
 
+#include "measure.h"
+
 #include <stdio.h>
-#include <time.h>
 #include <unistd.h>
 
 #define BAR 30
 
-double progress_seconds(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 void progress_start(progress *p, int32_t total, int quiet) {
     *p = (progress){
-        .enabled = !quiet && isatty(STDERR_FILENO), .total = total, .begin = progress_seconds()};
+        .enabled = !quiet && isatty(STDERR_FILENO), .total = total, .begin = measure_seconds()};
 }
 
 void progress_update(progress *p, int32_t done, int32_t solves, int32_t converged) {
-    const double time = progress_seconds();
+    const double time = measure_seconds();
     if (!p->enabled || (time - p->drawn < 0.1 && done < p->total) || done == 0) {
         return;
     }

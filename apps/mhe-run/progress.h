@@ -18,6 +18,5 @@ void progress_start(progress *p, int32_t total, int quiet);
  * second. */
 void progress_update(progress *p, int32_t done, int32_t solves, int32_t converged);
 void progress_end(progress *p); /* clears the line */
-double progress_seconds(void);  /* monotonic clock */
 
 #endif

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "summary.h"
 
+#include "measure.h"
+
 #include <cJSON.h>
 #include <math.h>
 #include <mhe/version.h>
@@ -32,15 +34,9 @@ void summary_free(summary *s) {
     free(s->solve_ms);
 }
 
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
-/* Nearest-rank percentile of the sorted solve times, ms. */
+/* Of the sorted solve times, ms. */
 static double percentile(const summary *s, double fraction) {
-    const int32_t rank = (int32_t)ceil(fraction * s->n_solves);
-    return s->n_solves == 0 ? NAN : s->solve_ms[rank < 1 ? 0 : rank - 1];
+    return measure_percentile(s->solve_ms, s->n_solves, fraction);
 }
 
 static double mean_ms(const summary *s) {
@@ -85,7 +81,7 @@ static void add_times(cJSON *root, const summary *s) {
 }
 
 mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
-    qsort(s->solve_ms, (size_t)s->n_solves, sizeof(double), by_value);
+    measure_sort(s->solve_ms, s->n_solves);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "version", MHE_VERSION);
     cJSON_AddStringToObject(root, "config", config);

@@ -2,6 +2,7 @@
 #include "track.h"
 
 #include "estimator/create.h"
+#include "measure.h"
 #include "picture.h"
 #include "progress.h"
 #include "results.h"
@@ -84,7 +85,7 @@ static mhe_status estimate_all(tracking *t, mhe_error *err) {
         t->summary.n_pushed = k + 1;
         progress_update(&bar, k + 1, t->summary.n_solves, t->summary.n_converged);
     }
-    t->summary.elapsed = progress_seconds() - bar.begin;
+    t->summary.elapsed = measure_seconds() - bar.begin;
     progress_end(&bar);
     return status;
 }
