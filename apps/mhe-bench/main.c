@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe-bench: times every layer of the estimator and whole runs, variant against variant. */
+#include "arguments.h"
+#include "console.h"
+#include "io/sink.h"
+#include "picture.h"
+#include "report.h"
+
+#include <mhe/version.h>
+#include <stdlib.h>
+
+#define REPEATS 5
+#define QUICK_REPEATS 2
+#define QUICK_ESTIMATES 25
+
+static mhe_status write_files(const arguments *a, const bench *b, const mhe_host *host,
+                              mhe_error *err) {
+    const mhi_run *run = b->setup->variants->list[0].run;
+    char folder[4096];
+    int length = a->out != NULL ? snprintf(folder, sizeof folder, "%s", a->out)
+                                : snprintf(folder, sizeof folder, "out/%s", run->name);
+    if (length < 0 || (size_t)length >= sizeof folder) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "the path of the output folder is too long");
+    }
+    mhi_text text = {0};
+    mhi_outbox *outbox = NULL;
+    mhe_status status = report_json(b, a->config, &text, err);
+    if (status == MHE_OK && text.failed) {
+        status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_open(folder, &outbox, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_text(outbox, "bench.json", text.data, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_commit(outbox, err);
+    }
+    mhi_outbox_close(outbox);
+    mhi_text_free(&text);
+    mhe_error why = {0};
+    if (status == MHE_OK && run->output.picture && picture_rate(b, folder, &why) != MHE_OK) {
+        host->log(host, MHE_LOG_WARNING, why.text);
+    }
+    if (status == MHE_OK) {
+        (void)printf("results in %s\n", folder);
+    }
+    return status;
+}
+
+static mhe_status measure(const arguments *a, const variants *v, const mhe_host *host,
+                          mhe_error *err) {
+    const bench_setup setup = {.variants = v,
+                               .host = host,
+                               .repeats = a->repeats > 0 ? a->repeats
+                                          : a->quick     ? QUICK_REPEATS
+                                                         : REPEATS,
+                               .estimates = a->quick ? QUICK_ESTIMATES : 0};
+    bench *b = malloc(sizeof *b);
+    if (b == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhi_text text = {0};
+    mhe_status status = bench_measure(&setup, b, err);
+    if (status == MHE_OK) {
+        report_table(b, &text);
+        status = console_print(&text, err);
+    }
+    if (status == MHE_OK) {
+        status = write_files(a, b, host, err);
+    }
+    bench_free(b);
+    free(b);
+    return status;
+}
+
+static mhe_status run(const arguments *a, const mhe_host *host, mhe_error *err) {
+    const char *const windows[] = {a->quick ? "horizon.window=3,7,15"
+                                            : "horizon.window=1,3,5,7,10,15,22"};
+    mhi_registry *registry = NULL;
+    mhe_status status = mhi_registry_create(host, &registry, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    variants v;
+    status = variants_read(a->config, a->set, a->n_set, a->n_vary > 0 ? a->vary : windows,
+                           a->n_vary > 0 ? a->n_vary : 1, registry, &v, err);
+    if (status == MHE_OK) {
+        status = measure(a, &v, host, err);
+    }
+    variants_free(&v);
+    mhi_registry_free(registry);
+    return status;
+}
+
+int main(int argc, char **argv) {
+    const mhe_host host = console_host("mhe-bench");
+    arguments a;
+    mhe_error err = {0};
+    mhe_status status = arguments_parse(argc, argv, &a, &err);
+    if (status == MHE_OK && a.mode == MODE_HELP) {
+        (void)fputs(arguments_help, stdout);
+    } else if (status == MHE_OK && a.mode == MODE_VERSION) {
+        (void)printf("mhe-bench %s\n", MHE_VERSION);
+    } else if (status == MHE_OK) {
+        status = run(&a, &host, &err);
+    }
+    if (status == MHE_OK && fflush(stdout) != 0) {
+        status = mhe_fail(&err, MHE_E_IO, "the output could not be written");
+    }
+    if (status != MHE_OK) {
+        (void)fprintf(stderr, "mhe-bench: %s\n", err.text);
+    }
+    arguments_free(&a);
+    return console_exit_status(status);
+}

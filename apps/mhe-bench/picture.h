@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* picture.h: rate against window. */
+#ifndef PICTURE_H
+#define PICTURE_H
+
+#include "bench.h"
+
+/* Makes dir/rate.gp and dir/rate.svg. MHE_E_UNSUPPORTED: gnuplot is not installed. */
+mhe_status picture_rate(const bench *b, const char *dir, mhe_error *err);
+
+#endif

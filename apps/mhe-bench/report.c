@@ -1,0 +1,172 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "report.h"
+
+#include <cJSON.h>
+#include <math.h>
+#include <mhe/version.h>
+#include <string.h>
+
+/* ---- terminal ---- */
+
+static int width_of_names(const variants *v) {
+    size_t width = strlen("whole frames");
+    for (int32_t i = 0; i < v->n; i++) {
+        const size_t length = strlen(v->list[i].name);
+        width = length > width ? length : width;
+    }
+    return (int)width;
+}
+
+static void add_ratio(const bench_ratio *r, int several, mhi_text *out) {
+    if (several) {
+        mhi_text_add(out, " %7.3f %7.3f %7.3f", r->least, r->median, r->most);
+    }
+}
+
+static const variant *first_of_group(const variants *v, int32_t group) {
+    int32_t i = 0;
+    while (v->list[i].group != group) {
+        i++;
+    }
+    return &v->list[i];
+}
+
+static void add_layers(const bench *b, mhi_text *out) {
+    const variants *v = b->setup->variants;
+    const int several = v->n_groups > 1;
+    mhi_text_add(out, "%-34s %9s %9s %9s %9s%s\n", "layer (us a call)", "p50", "p95", "p99", "max",
+                 several ? "   x min   x med   x max  variant" : "");
+    for (int32_t i = 0; i < b->n_layers; i++) {
+        const bench_layer *l = &b->layers[i];
+        const bench_spread *s = &l->spread;
+        mhi_text_add(out, "%-34s %9.2f %9.2f %9.2f %9.2f", layer_names[l->layer], 1e6 * s->p50,
+                     1e6 * s->p95, 1e6 * s->p99, 1e6 * s->most);
+        add_ratio(&l->ratio, several, out);
+        mhi_text_add(out, several ? "  %s\n" : "\n", first_of_group(v, l->group)->group_name);
+    }
+}
+
+static void add_runs(const bench *b, mhi_text *out) {
+    const variants *v = b->setup->variants;
+    const int width = width_of_names(v), several = v->n > 1;
+    mhi_text_add(out, "\n%-*s %8s %8s %8s %8s %8s %7s%s%s\n", width, "whole frames", "rate Hz",
+                 "p50 ms", "p95", "p99", "max", "conv %", several ? "   x min   x med   x max" : "",
+                 b->runs[0].rig.has_rmse ? "   q deg   force N" : "");
+    for (int32_t i = 0; i < v->n; i++) {
+        const bench_run *run = &b->runs[i];
+        const bench_spread *s = &run->spread;
+        const rig *r = &run->rig;
+        mhi_text_add(out, "%-*s %8.1f %8.3f %8.3f %8.3f %8.3f %7.2f", width, v->list[i].name,
+                     run->rate, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->most,
+                     100.0 * r->n_converged / r->n_estimates);
+        add_ratio(&run->ratio, several, out);
+        if (r->has_rmse) {
+            mhi_text_add(out, " %8.4f %8.3f", 180 / acos(-1) * r->rmse.q, r->rmse.force);
+        }
+        mhi_text_add(out, "\n");
+    }
+}
+
+void report_table(const bench *b, mhi_text *out) {
+    const rig *r = &b->runs[0].rig;
+    mhi_text_add(out, "%s: %d coordinates, %d muscles, %d markers; %d %s of each variant\n\n",
+                 r->info.config_name, r->info.n_q, r->info.n_muscles, r->info.n_markers,
+                 b->setup->repeats, b->setup->repeats == 1 ? "run" : "runs, in alternation,");
+    add_layers(b, out);
+    add_runs(b, out);
+    mhi_text_add(out, "\nx: times the first variant, measured side by side; all in %.0f s\n",
+                 b->elapsed);
+}
+
+/* ---- bench.json ---- */
+
+/* cJSON writes NaN as null, which is what "not known" is in JSON. */
+static void add_number(cJSON *object, const char *key, double value) {
+    cJSON_AddNumberToObject(object, key, value);
+}
+
+static void json_spread(cJSON *object, const char *key, const bench_spread *s, double scale) {
+    cJSON *o = cJSON_AddObjectToObject(object, key);
+    add_number(o, "p50", scale * s->p50);
+    add_number(o, "p95", scale * s->p95);
+    add_number(o, "p99", scale * s->p99);
+    add_number(o, "max", scale * s->most);
+}
+
+static void json_ratio(cJSON *object, const bench_ratio *r) {
+    cJSON *o = cJSON_AddObjectToObject(object, "ratio_to_first");
+    add_number(o, "min", r->least);
+    add_number(o, "median", r->median);
+    add_number(o, "max", r->most);
+}
+
+static void json_setting(cJSON *object, const rig *r) {
+    cJSON_AddStringToObject(object, "formulation",
+                            r->info.formulation == 0 ? "excitation" : "activation");
+    cJSON_AddStringToObject(object, "solver", r->info.solver);
+    add_number(object, "n_window", r->info.window);
+    add_number(object, "ratio", r->info.ratio);
+}
+
+static void json_layer(cJSON *list, const bench *b, const bench_layer *l) {
+    const variant *v = first_of_group(b->setup->variants, l->group);
+    cJSON *o = cJSON_CreateObject();
+    cJSON_AddItemToArray(list, o);
+    cJSON_AddStringToObject(o, "layer", layer_keys[l->layer]);
+    cJSON_AddStringToObject(o, "variant", v->group_name);
+    json_setting(o, &b->runs[v - b->setup->variants->list].rig);
+    add_number(o, "samples", l->n);
+    add_number(o, "calls_per_sample", l->calls);
+    json_spread(o, "us", &l->spread, 1e6);
+    json_ratio(o, &l->ratio);
+}
+
+static void json_run(cJSON *list, const bench_run *run) {
+    const rig *r = &run->rig;
+    cJSON *o = cJSON_CreateObject();
+    cJSON_AddItemToArray(list, o);
+    cJSON_AddStringToObject(o, "variant", r->variant->name);
+    json_setting(o, r);
+    add_number(o, "estimates", r->n_estimates);
+    add_number(o, "converged", (double)r->n_converged / r->n_estimates);
+    cJSON *iterations = cJSON_AddObjectToObject(o, "iterations");
+    add_number(iterations, "mean", r->iterations_sum / r->n_estimates);
+    add_number(iterations, "max", r->iterations_max);
+    add_number(o, "rate_hz", run->rate);
+    json_spread(o, "frame_ms", &run->spread, 1e3);
+    json_ratio(o, &run->ratio);
+    if (r->has_rmse) {
+        cJSON *rmse = cJSON_AddObjectToObject(o, "rmse");
+        add_number(rmse, "q_deg", 180 / acos(-1) * r->rmse.q);
+        add_number(rmse, "force_n", r->rmse.force);
+        add_number(rmse, "marker_mm", 1e3 * r->rmse.marker);
+    }
+}
+
+mhe_status report_json(const bench *b, const char *config, mhi_text *out, mhe_error *err) {
+    cJSON *root = cJSON_CreateObject();
+    cJSON_AddStringToObject(root, "version", MHE_VERSION);
+    cJSON_AddStringToObject(root, "config", config);
+    cJSON *model = cJSON_AddObjectToObject(root, "model");
+    add_number(model, "nq", b->runs[0].rig.info.n_q);
+    add_number(model, "nmuscles", b->runs[0].rig.info.n_muscles);
+    add_number(model, "nmarkers", b->runs[0].rig.info.n_markers);
+    add_number(root, "repeats", b->setup->repeats);
+    add_number(root, "elapsed_s", b->elapsed);
+    cJSON *layer_list = cJSON_AddArrayToObject(root, "layers");
+    for (int32_t i = 0; i < b->n_layers; i++) {
+        json_layer(layer_list, b, &b->layers[i]);
+    }
+    cJSON *run_list = cJSON_AddArrayToObject(root, "runs");
+    for (int32_t i = 0; i < b->setup->variants->n; i++) {
+        json_run(run_list, &b->runs[i]);
+    }
+    char *text = cJSON_Print(root);
+    cJSON_Delete(root);
+    if (text == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhi_text_add(out, "%s\n", text);
+    cJSON_free(text);
+    return MHE_OK;
+}

@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "rig.h"
+
+#include "measure.h"
+
+#include <string.h>
+
+static mhe_frame frame_of(const rig *r, int32_t k) {
+    const mhi_recording *d = r->recording;
+    return (mhe_frame){
+        .size = sizeof(mhe_frame),
+        .time = d->time[k],
+        .markers = d->markers == NULL ? NULL : d->markers + (ptrdiff_t)k * 3 * r->info.n_markers,
+        .emg = d->emg == NULL ? NULL : d->emg + (ptrdiff_t)k * r->info.n_muscles};
+}
+
+static void start(const rig *r, mhe_estimator *estimator) {
+    if (r->recording->reference.present) {
+        mhi_estimator_set_start(estimator, r->recording->reference.q, r->recording->reference.qdot);
+    }
+}
+
+/* The estimate's node as a point of the problem. */
+static void keep_point(rig *r, const mhe_system *face, const mhe_estimate *e) {
+    if (r->n_points == RIG_POINTS_MAX) {
+        return;
+    }
+    const size_t n_q = sizeof(double) * (size_t)face->n_q, n_m = sizeof(double) * (size_t)face->n_m;
+    double *x = r->x + (ptrdiff_t)r->n_points * face->n_x;
+    double *u = r->u + (ptrdiff_t)r->n_points * face->n_u;
+    memcpy(x, e->q, n_q);
+    memcpy(x + face->n_q, e->qdot, n_q);
+    memcpy(u, e->excitation == NULL ? e->activation : e->excitation, n_m);
+    if (face->n_a > 0) {
+        memcpy(x + 2 * face->n_q, e->activation, n_m);
+    }
+    if (face->n_r > 0) {
+        memcpy(u + face->n_m, e->residual, sizeof(double) * (size_t)face->n_r);
+    }
+    r->n_points++;
+}
+
+static mhe_status take(rig *r, mhi_errors *errors, const mhe_estimate *e, mhe_error *err) {
+    r->n_estimates++;
+    r->n_converged += e->status == MHE_FRAME_OK;
+    r->iterations_sum += e->iterations;
+    r->iterations_max = e->iterations > r->iterations_max ? e->iterations : r->iterations_max;
+    keep_point(r, mhi_system_face(mhi_estimator_system(r->estimator)), e);
+    return errors == NULL ? MHE_OK : mhi_errors_add(errors, e, err);
+}
+
+static mhe_status first_run(rig *r, mhe_error *err) {
+    mhi_errors *errors = NULL;
+    mhe_status status = MHE_OK;
+    if (r->recording->reference.present) {
+        status = mhi_errors_create(mhi_estimator_system(r->estimator), r->recording, &errors, err);
+    }
+    start(r, r->estimator);
+    for (int32_t k = 0; k < r->n_frames && status == MHE_OK; k++) {
+        const mhe_frame frame = frame_of(r, k);
+        mhe_estimate estimate = {.size = sizeof estimate};
+        int32_t ready = 0;
+        status = mhe_estimator_push(r->estimator, &frame, &estimate, &ready, err);
+        if (status == MHE_OK && ready) {
+            status = take(r, errors, &estimate, err);
+        }
+    }
+    const mhi_output_section *output = &r->variant->run->output;
+    r->has_rmse = status == MHE_OK && errors != NULL;
+    if (r->has_rmse) {
+        mhi_errors_rmse(errors, output->skip_first, output->skip_last, &r->rmse);
+    }
+    mhi_errors_free(errors);
+    if (status == MHE_OK && r->n_estimates == 0) {
+        return mhe_fail(err, MHE_E_INPUT, "%s: %d frames are too few for a window of %d intervals",
+                        r->variant->name, r->n_frames, r->info.window);
+    }
+    return status;
+}
+
+mhe_status rig_create(const variant *v, int32_t estimates, const mhe_host *loud,
+                      const mhe_host *silent, rig *r, mhe_error *err) {
+    *r = (rig){.variant = v, .host = silent};
+    mhe_status status = mhi_estimator_create(v->run, loud, &r->estimator, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    const mhi_system *system = mhi_estimator_system(r->estimator);
+    mhe_estimator_describe(r->estimator, &r->info);
+    status = mhi_recording_read(v->run, mhi_system_description(system), loud, &r->recording, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    const int64_t wanted = ((int64_t)r->info.window + estimates) * r->info.ratio;
+    const int cut = estimates > 0 && wanted < r->recording->n_frames;
+    r->n_frames = cut ? (int32_t)wanted : r->recording->n_frames;
+    r->n_estimates_max = r->n_frames / r->info.ratio + 1;
+    r->x = MHI_TAKE(&r->arena, double, RIG_POINTS_MAX *mhi_system_face(system)->n_x);
+    r->u = MHI_TAKE(&r->arena, double, RIG_POINTS_MAX *mhi_system_face(system)->n_u);
+    if (r->x == NULL || r->u == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    return first_run(r, err);
+}
+
+void rig_free(rig *r) {
+    mhi_recording_free(r->recording);
+    mhe_estimator_close(r->estimator);
+    mhi_arena_free(&r->arena);
+}
+
+mhe_status rig_run(const rig *r, double *frame_seconds, int32_t *n, mhe_error *err) {
+    mhe_estimator *estimator = NULL;
+    *n = 0;
+    mhe_status status = mhi_estimator_create(r->variant->run, r->host, &estimator, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    start(r, estimator);
+    for (int32_t k = 0; k < r->n_frames && status == MHE_OK; k++) {
+        const mhe_frame frame = frame_of(r, k);
+        mhe_estimate estimate = {.size = sizeof estimate};
+        int32_t ready = 0;
+        const double begin = measure_seconds();
+        status = mhe_estimator_push(estimator, &frame, &estimate, &ready, err);
+        const double end = measure_seconds();
+        if (status == MHE_OK && ready) {
+            frame_seconds[(*n)++] = end - begin;
+        }
+    }
+    mhe_estimator_close(estimator);
+    return status;
+}

@@ -1,0 +1,92 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# mhe-bench on the demo: the table, bench.json and the picture are there and whole; bad arguments say why. No time is judged.
+#   bench.sh BIN_DIR SOURCE_DIR
+set -u
+bench=$1/mhe-bench
+demo=$2/models/arm19/demo.yaml
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failed=0
+
+fail() {
+    echo "FAILED $*"
+    failed=$((failed + 1))
+}
+
+# has FILE 'TEXT'...
+has() {
+    file=$1
+    shift
+    for text in "$@"; do
+        grep -qF -- "$text" "$file" || fail "'$text' is not in $file"
+    done
+}
+
+"$bench" "$demo" --quick --repeats 1 --vary formulation=excitation,activation --vary horizon.window=2,3 --out result \
+    > table.txt 2> err.txt || fail "exit status $?: $(cat err.txt)"
+grep -v 'no picture: gnuplot cannot be started' err.txt | grep . && fail "messages"
+has table.txt p50 p95 p99 max 'x med' 'skeleton kinematics' 'system acceleration, derivatives' 'activation rates' \
+    'shooting interval with A and B' 'stage cost' 'linearisation of the window' \
+    'formulation=excitation horizon.window=2' 'formulation=activation horizon.window=3'
+json=result/bench.json
+has $json '"kinematics"' '"acceleration"' '"acceleration_derivatives"' '"activation_rate"' '"interval"' \
+    '"interval_derivatives"' '"stage_cost"' '"window_linearisation"' '"calls_per_sample"' '"ratio_to_first"' \
+    '"rate_hz"' '"frame_ms"' '"p50"' '"p95"' '"p99"' '"converged"' '"rmse"' '"force_n"'
+# 8 layers of two formulations, of which one has no activation dynamics; 4 variants.
+[ "$(grep -c '"calls_per_sample"' $json)" -eq 15 ] || fail "$(grep -c '"calls_per_sample"' $json) layers"
+[ "$(grep -c '"frame_ms"' $json)" -eq 4 ] || fail "$(grep -c '"frame_ms"' $json) runs"
+grep -q null $json && fail "a value is missing"
+if command -v python3 > /dev/null; then
+    python3 - $json << 'END' || fail "bench.json"
+import json, sys
+bench = json.load(open(sys.argv[1]))
+assert [run["n_window"] for run in bench["runs"]] == [2, 3, 2, 3]
+assert [run["formulation"] for run in bench["runs"]] == 2 * ["excitation"] + 2 * ["activation"]
+first = bench["runs"][0]["ratio_to_first"]
+assert first["min"] == first["median"] == first["max"] == 1
+for item in bench["layers"] + bench["runs"]:
+    t = item["us"] if "us" in item else item["frame_ms"]
+    assert 0 < t["p50"] <= t["p95"] <= t["p99"] <= t["max"]
+    r = item["ratio_to_first"]
+    assert 0 < r["min"] <= r["median"] <= r["max"]
+END
+fi
+[ -s result/rate.gp ] || fail "no rate.gp"
+if command -v gnuplot > /dev/null; then
+    has result/rate.svg '</svg>' 'formulation=excitation' 'formulation=activation' 'biofeedback, 13.3 Hz' 'window (intervals)'
+fi
+find . -name '.*' -type f | grep . && fail "temporary files are left"
+
+# refused 'TEXT IN THE MESSAGE' ARGUMENTS...: exit status 2, one line, nothing written
+refused() {
+    text=$1
+    shift
+    rm -rf other
+    "$bench" --out other "$@" > out.txt 2> err.txt
+    status=$?
+    [ $status -eq 2 ] || fail "$*: exit status $status"
+    [ "$(wc -l < err.txt)" -eq 1 ] || fail "$*: $(cat err.txt)"
+    [ ! -e other ] && [ ! -s out.txt ] || fail "$*: something was written"
+    has err.txt "$text"
+}
+
+refused 'config file'
+refused 'nowhere.yaml' nowhere.yaml
+refused "did you mean '--quick'" "$demo" --quik
+refused 'one config file' "$demo" "$demo"
+refused '--repeats' "$demo" --repeats 0
+refused '--repeats' "$demo" --repeats 2x
+refused 'needs a value' "$demo" --vary
+refused 'wanted is' "$demo" --vary horizon.window
+refused 'a value is empty' "$demo" --vary horizon.window=3,,4
+refused 'more than 64' "$demo" --vary horizon.window=1,2,3,4,5,6,7,8,9 --vary horizon.ratio=1,2,3,4,5,6,7,8,9
+refused "did you mean 'window'" "$demo" --vary horizon.windw=1,2
+refused "'window' must lie" "$demo" --vary horizon.window=3,0
+refused 'too few' "$demo" --quick --vary horizon.window=3,900
+"$bench" --help | grep -q -- '--vary' || fail "--help"
+"$bench" --version | grep -q '^mhe-bench [0-9]' || fail "--version"
+
+[ $failed -eq 0 ] && echo "bench: all as it should be"
+[ $failed -eq 0 ]
