@@ -52,7 +52,7 @@ static const mhe_option initial_options[] = {
 };
 
 static const mhe_option horizon_options[] = {
-    MHE_OPT_INT(mhi_horizon_section, window, 7, 1, 1000, "1", "Intervals in the window."),
+    MHE_OPT_INT(mhi_horizon_section, window, 7, 2, 1000, "1", "Intervals in the window."),
     MHE_OPT_INT(mhi_horizon_section, ratio, 1, 1, INT32_MAX, "1",
                 "Every ratio-th frame of the data is used."),
 };
