@@ -86,7 +86,7 @@ static const char *name_below(const char *name, const char *parent) {
         return NULL;
     }
     const char *last = n > 0 ? name + n + 1 : name;
-    return *last != '\0' && strchr(last, '.') == NULL ? last : NULL;
+    return *last != '\0' && last[strcspn(last, ".")] == '\0' ? last : NULL;
 }
 
 static const mhi_node *section_node(const mhi_tree *tree, const char *name) {
