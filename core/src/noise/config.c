@@ -81,12 +81,12 @@ static const mhi_section sections[] = {
 
 /* "emg" of "noise.emg" in "noise"; NULL where `name` is not right below `parent`. */
 static const char *name_below(const char *name, const char *parent) {
-    const size_t n = strlen(parent);
-    if (n > 0 && (strncmp(name, parent, n) != 0 || name[n] != '.')) {
+    const char *dot = strrchr(name, '.');
+    const size_t head = dot != NULL ? (size_t)(dot - name) : 0;
+    if (*name == '\0' || head != strlen(parent) || strncmp(name, parent, head) != 0) {
         return NULL;
     }
-    const char *last = n > 0 ? name + n + 1 : name;
-    return *last != '\0' && last[strcspn(last, ".")] == '\0' ? last : NULL;
+    return dot != NULL ? dot + 1 : name;
 }
 
 static const mhi_node *section_node(const mhi_tree *tree, const char *name) {
