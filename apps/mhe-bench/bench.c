@@ -4,6 +4,7 @@
 #include "measure.h"
 
 #include <math.h>
+#include <string.h>
 
 #define SAMPLES 100     /* of a layer in each repeat */
 #define SHORTEST 20e-6  /* s: a sample is no shorter, so that the clock does not count */
@@ -56,34 +57,45 @@ static mhe_status calibrate(layers *l, bench_layer *b, mhe_error *err) {
     return status;
 }
 
+/* `of_group` [n_groups]. */
 static mhe_status prepare_layers(bench *b, layers *const *of_group, mhe_error *err) {
-    const int32_t n_groups = b->setup->variants->n_groups, n = SAMPLES * b->setup->repeats;
-    mhe_status status = MHE_OK;
-    for (int32_t layer = 0; layer < N_LAYERS; layer++) {
-        for (int32_t g = 0; g < n_groups && status == MHE_OK; g++) {
-            if (!layers_has(of_group[g], layer)) {
-                continue;
-            }
-            bench_layer *new = &b->layers[b->n_layers++];
-            *new = (bench_layer){.layer = layer, .group = g, .n = n};
-            new->samples = MHI_TAKE(&b->arena, double, n);
-            status = new->samples == NULL ? no_memory(err) : calibrate(of_group[g], new, err);
+    const variants *v = b->setup->variants;
+    const int32_t n = SAMPLES * b->setup->repeats;
+    for (int32_t job = 0; job < N_LAYERS * v->n; job++) {
+        const variant *of = &v->list[job % v->n];
+        const int32_t layer = job / v->n;
+        if (!of->opens_group || !layers_has(of_group[of->group], layer)) {
+            continue;
+        }
+        bench_layer *new = &b->layers[b->n_layers++];
+        *new = (bench_layer){.layer = layer, .rig = &b->runs[job % v->n].rig, .n = n};
+        new->samples = MHI_TAKE(&b->arena, double, n);
+        if (new->samples == NULL) {
+            return no_memory(err);
+        }
+        mhe_status status = calibrate(of_group[of->group], new, err);
+        if (status != MHE_OK) {
+            return blame(of, status, err);
         }
     }
-    return status;
+    return MHE_OK;
 }
 
 /* Sample by sample through all layers and groups: what disturbs one disturbs its neighbours. */
 static mhe_status sample_layers(bench *b, layers *const *of_group, mhe_error *err) {
-    mhe_status status = MHE_OK;
     for (int32_t i = 0; i < SAMPLES * b->setup->repeats; i++) {
-        for (int32_t j = 0; j < b->n_layers && status == MHE_OK; j++) {
+        for (int32_t j = 0; j < b->n_layers; j++) {
             bench_layer *l = &b->layers[j];
-            status = layers_time(of_group[l->group], l->layer, l->calls, &l->samples[i], err);
-            l->samples[i] /= l->calls;
+            const variant *of = l->rig->variant;
+            double seconds = 0;
+            mhe_status status = layers_time(of_group[of->group], l->layer, l->calls, &seconds, err);
+            if (status != MHE_OK) {
+                return blame(of, status, err);
+            }
+            l->samples[i] = seconds / l->calls;
         }
     }
-    return status;
+    return MHE_OK;
 }
 
 static mhe_status measure_layers(bench *b, mhe_error *err) {
@@ -123,19 +135,25 @@ static mhe_status prepare_runs(bench *b, mhe_error *err) {
         run->frames =
             MHI_TAKE(&b->arena, double, (size_t)repeats *(size_t)run->rig.n_estimates_max);
         run->means = MHI_TAKE(&b->arena, double, repeats);
-        if (run->frames == NULL || run->means == NULL) {
+        run->firsts = MHI_TAKE(&b->arena, double, repeats);
+        if (run->frames == NULL || run->means == NULL || run->firsts == NULL) {
             return no_memory(err);
         }
     }
     return MHE_OK;
 }
 
+/* The first estimate of a run, which starts from nothing, is told apart from the others. */
 static mhe_status run_once(bench_run *run, int32_t repeat, mhe_error *err) {
     double *frames = run->frames + run->n, sum = 0;
     int32_t n = 0;
     mhe_status status = rig_run(&run->rig, frames, &n, err);
     if (status != MHE_OK) {
         return blame(run->rig.variant, status, err);
+    }
+    run->firsts[repeat] = frames[0];
+    if (n > 1) {
+        memmove(frames, frames + 1, sizeof(double) * (size_t)--n);
     }
     for (int32_t i = 0; i < n; i++) {
         sum += frames[i];
@@ -178,6 +196,8 @@ static mhe_status sum_up(bench *b, mhe_error *err) {
         bench_run *run = &b->runs[i];
         run->ratio = ratio_of(run->means, b->runs[0].means, repeats, scratch);
         run->spread = spread_of(run->frames, run->n);
+        measure_sort(run->firsts, repeats);
+        run->first = measure_median(run->firsts, repeats);
         measure_sort(run->means, repeats);
         run->rate = 1 / measure_median(run->means, repeats);
     }

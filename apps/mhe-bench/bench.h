@@ -24,7 +24,8 @@ typedef struct bench_ratio {
 
 /* One layer of one group of variants. */
 typedef struct bench_layer {
-    int32_t layer, group;
+    int32_t layer;
+    const rig *rig;  /* the first of its group */
     int32_t calls;   /* a sample is the mean of so many: short calls are timed together */
     int32_t n;       /* samples */
     double *samples; /* [n] s; sorted when summed up */
@@ -35,11 +36,13 @@ typedef struct bench_layer {
 /* Whole runs of one variant. */
 typedef struct bench_run {
     rig rig;
-    double *frames; /* [n] s: every estimate of every run; sorted when summed up */
+    double *frames; /* [n] s: all estimates of all runs but their first; sorted when summed up */
     int32_t n;
-    double *means; /* [repeats] s: mean time of an estimate in each run */
+    double *firsts; /* [repeats] s: first estimate of each run, from a cold start */
+    double *means;  /* [repeats] s: mean time of an estimate but the first in each run */
     bench_spread spread;
-    double rate; /* estimates per second, of the median run */
+    double first; /* s, median */
+    double rate;  /* estimates per second, of the median run */
     bench_ratio ratio;
 } bench_run;
 

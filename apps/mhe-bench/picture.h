@@ -5,7 +5,8 @@
 
 #include "bench.h"
 
-/* Makes dir/rate.gp and dir/rate.svg. MHE_E_UNSUPPORTED: gnuplot is not installed. */
+/* Makes dir/rate.gp and dir/rate.svg of the first twenty groups. MHE_E_UNSUPPORTED: gnuplot is not
+ * installed. */
 mhe_status picture_rate(const bench *b, const char *dir, mhe_error *err);
 
 #endif

@@ -23,42 +23,39 @@ static void add_ratio(const bench_ratio *r, int several, mhi_text *out) {
     }
 }
 
-static const variant *first_of_group(const variants *v, int32_t group) {
-    int32_t i = 0;
-    while (v->list[i].group != group) {
-        i++;
-    }
-    return &v->list[i];
-}
-
 static void add_layers(const bench *b, mhi_text *out) {
-    const variants *v = b->setup->variants;
-    const int several = v->n_groups > 1;
-    mhi_text_add(out, "%-34s %9s %9s %9s %9s%s\n", "layer (us a call)", "p50", "p95", "p99", "max",
+    const int several = b->setup->variants->n_groups > 1;
+    mhi_text_add(out, "%-36s %9s %9s %9s %9s%s\n", "layer (us a call)", "p50", "p95", "p99", "max",
                  several ? "   x min   x med   x max  variant" : "");
     for (int32_t i = 0; i < b->n_layers; i++) {
         const bench_layer *l = &b->layers[i];
         const bench_spread *s = &l->spread;
-        mhi_text_add(out, "%-34s %9.2f %9.2f %9.2f %9.2f", layer_names[l->layer], 1e6 * s->p50,
-                     1e6 * s->p95, 1e6 * s->p99, 1e6 * s->most);
+        char name[64] = "";
+        if (l->layer == LAYER_LINEARISATION) {
+            (void)snprintf(name, sizeof name, ", N = %d", l->rig->info.window);
+        }
+        mhi_text_add(out, "%s%-*s %9.2f %9.2f %9.2f %9.2f", layer_names[l->layer],
+                     36 - (int)strlen(layer_names[l->layer]), name, 1e6 * s->p50, 1e6 * s->p95,
+                     1e6 * s->p99, 1e6 * s->most);
         add_ratio(&l->ratio, several, out);
-        mhi_text_add(out, several ? "  %s\n" : "\n", first_of_group(v, l->group)->group_name);
+        mhi_text_add(out, several ? "  %s\n" : "\n", l->rig->variant->group_name);
     }
 }
 
 static void add_runs(const bench *b, mhi_text *out) {
     const variants *v = b->setup->variants;
     const int width = width_of_names(v), several = v->n > 1;
-    mhi_text_add(out, "\n%-*s %8s %8s %8s %8s %8s %7s%s%s\n", width, "whole frames", "rate Hz",
-                 "p50 ms", "p95", "p99", "max", "conv %", several ? "   x min   x med   x max" : "",
+    mhi_text_add(out, "\n%-*s %8s %8s %8s %8s %8s %8s %7s%s%s\n", width, "whole frames", "rate Hz",
+                 "p50 ms", "p95", "p99", "max", "first", "conv %",
+                 several ? "   x min   x med   x max" : "",
                  b->runs[0].rig.has_rmse ? "   q deg   force N" : "");
     for (int32_t i = 0; i < v->n; i++) {
         const bench_run *run = &b->runs[i];
         const bench_spread *s = &run->spread;
         const rig *r = &run->rig;
-        mhi_text_add(out, "%-*s %8.1f %8.3f %8.3f %8.3f %8.3f %7.2f", width, v->list[i].name,
+        mhi_text_add(out, "%-*s %8.1f %8.3f %8.3f %8.3f %8.3f %8.3f %7.2f", width, v->list[i].name,
                      run->rate, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->most,
-                     100.0 * r->n_converged / r->n_estimates);
+                     1e3 * run->first, 100.0 * r->n_converged / r->n_estimates);
         add_ratio(&run->ratio, several, out);
         if (r->has_rmse) {
             mhi_text_add(out, " %8.4f %8.3f", 180 / acos(-1) * r->rmse.q, r->rmse.force);
@@ -74,8 +71,11 @@ void report_table(const bench *b, mhi_text *out) {
                  b->setup->repeats, b->setup->repeats == 1 ? "run" : "runs, in alternation,");
     add_layers(b, out);
     add_runs(b, out);
-    mhi_text_add(out, "\nx: times the first variant, measured side by side; all in %.0f s\n",
-                 b->elapsed);
+    mhi_text_add(
+        out,
+        "\nx: times the first variant, measured side by side. first: the first estimate of a "
+        "run, which the other columns leave out. All in %.0f s.\n",
+        b->elapsed);
 }
 
 /* ---- bench.json ---- */
@@ -108,13 +108,12 @@ static void json_setting(cJSON *object, const rig *r) {
     add_number(object, "ratio", r->info.ratio);
 }
 
-static void json_layer(cJSON *list, const bench *b, const bench_layer *l) {
-    const variant *v = first_of_group(b->setup->variants, l->group);
+static void json_layer(cJSON *list, const bench_layer *l) {
     cJSON *o = cJSON_CreateObject();
     cJSON_AddItemToArray(list, o);
     cJSON_AddStringToObject(o, "layer", layer_keys[l->layer]);
-    cJSON_AddStringToObject(o, "variant", v->group_name);
-    json_setting(o, &b->runs[v - b->setup->variants->list].rig);
+    cJSON_AddStringToObject(o, "variant", l->rig->variant->group_name);
+    json_setting(o, l->rig);
     add_number(o, "samples", l->n);
     add_number(o, "calls_per_sample", l->calls);
     json_spread(o, "us", &l->spread, 1e6);
@@ -134,6 +133,7 @@ static void json_run(cJSON *list, const bench_run *run) {
     add_number(iterations, "max", r->iterations_max);
     add_number(o, "rate_hz", run->rate);
     json_spread(o, "frame_ms", &run->spread, 1e3);
+    add_number(o, "first_frame_ms", 1e3 * run->first);
     json_ratio(o, &run->ratio);
     if (r->has_rmse) {
         cJSON *rmse = cJSON_AddObjectToObject(o, "rmse");
@@ -155,7 +155,7 @@ mhe_status report_json(const bench *b, const char *config, mhi_text *out, mhe_er
     add_number(root, "elapsed_s", b->elapsed);
     cJSON *layer_list = cJSON_AddArrayToObject(root, "layers");
     for (int32_t i = 0; i < b->n_layers; i++) {
-        json_layer(layer_list, b, &b->layers[i]);
+        json_layer(layer_list, &b->layers[i]);
     }
     cJSON *run_list = cJSON_AddArrayToObject(root, "runs");
     for (int32_t i = 0; i < b->setup->variants->n; i++) {
