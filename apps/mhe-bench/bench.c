@@ -29,8 +29,11 @@ static mhe_status blame(const variant *v, mhe_status status, mhe_error *err) {
 
 static bench_spread spread_of(double *values, int32_t n) {
     measure_sort(values, n);
-    return (bench_spread){measure_percentile(values, n, 0.5), measure_percentile(values, n, 0.95),
-                          measure_percentile(values, n, 0.99), measure_percentile(values, n, 1)};
+    return (bench_spread){.p50 = measure_percentile(values, n, 0.5),
+                          .p95 = measure_percentile(values, n, 0.95),
+                          .p99 = measure_percentile(values, n, 0.99),
+                          .p999 = measure_percentile(values, n, 0.999),
+                          .most = measure_percentile(values, n, 1)};
 }
 
 /* `scratch` [n]. */

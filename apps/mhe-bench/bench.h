@@ -14,7 +14,7 @@ typedef struct bench_setup {
 
 /* Percentiles of the times of one call, s. */
 typedef struct bench_spread {
-    double p50, p95, p99, most;
+    double p50, p95, p99, p999, most;
 } bench_spread;
 
 /* Of the times that were taken side by side with those of the first variant. */

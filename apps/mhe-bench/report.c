@@ -90,6 +90,7 @@ static void json_spread(cJSON *object, const char *key, const bench_spread *s, d
     add_number(o, "p50", scale * s->p50);
     add_number(o, "p95", scale * s->p95);
     add_number(o, "p99", scale * s->p99);
+    add_number(o, "p99.9", scale * s->p999);
     add_number(o, "max", scale * s->most);
 }
 
