@@ -162,9 +162,9 @@ static mhe_status integrate(reference *r, int32_t number, mhe_error *err) {
         status = simulation_files(s, folder, err);
     }
     if (status == MHE_OK) {
-        status =
-            reference_track(s, &r->done[number], driven ? b->excitation_min : b->activation_min,
-                            driven ? b->excitation_max : b->activation_max, &report, err);
+        status = reference_track(s, &r->done[number], step->drop,
+                                 driven ? b->excitation_min : b->activation_min,
+                                 driven ? b->excitation_max : b->activation_max, &report, err);
     }
     if (status == MHE_OK) {
         (void)printf("%s: integrated; feedback up to %.2g, then within %.2g rad and %.2g rad/s of "

@@ -14,6 +14,7 @@ typedef struct tracking {
     simulation *s;
     const mhi_trajectory *t;
     double lower, upper;
+    int32_t first; /* node */
     double *q_weight, *r_weight, *gain;
     track_report *report;
     mhi_arena arena;
@@ -85,9 +86,9 @@ static mhe_status move(tracking *w, mhi_sink *forces, mhe_error *err) {
     simulation *s = w->s;
     const mhi_trajectory *t = w->t;
     mhe_status status = MHE_OK;
-    memcpy(s->x, t->x, sizeof(double) * (size_t)t->n_x);
-    for (int32_t k = 0; k <= t->n && status == MHE_OK; k++) {
-        const double time = k * t->interval;
+    memcpy(s->x, t->x + (ptrdiff_t)w->first * t->n_x, sizeof(double) * (size_t)t->n_x);
+    for (int32_t k = w->first; k <= t->n && status == MHE_OK; k++) {
+        const double time = (k - w->first) * t->interval;
         control_at(w, k);
         status = simulation_write(s, time, err);
         if (status == MHE_OK) {
@@ -101,9 +102,10 @@ static mhe_status move(tracking *w, mhi_sink *forces, mhe_error *err) {
     return status;
 }
 
-mhe_status reference_track(simulation *s, const mhi_trajectory *solution, double lower,
-                           double upper, track_report *report, mhe_error *err) {
-    tracking w = {.s = s, .t = solution, .lower = lower, .upper = upper, .report = report};
+mhe_status reference_track(simulation *s, const mhi_trajectory *solution, int32_t first,
+                           double lower, double upper, track_report *report, mhe_error *err) {
+    tracking w = {
+        .s = s, .t = solution, .lower = lower, .upper = upper, .first = first, .report = report};
     mhi_sink *forces = NULL;
     *report = (track_report){0};
     mhe_status status = take(&w, err);

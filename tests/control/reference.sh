@@ -61,6 +61,17 @@ awk -F '\t' '$1 == "time" { for (i = 1; i <= NF; i++) { column[$i] = i } next }
 [ "$(awk -F '\t' '$1 + 0 == $1 && NF > 5 { print $29 }' result/short/reference.sto)" = \
     "$(awk -F '\t' '$1 + 0 == $1 && NF > 5 { print $2 }' result/short/emg.sto)" ] || fail "emg.sto is not the excitation"
 
+# Without its first 25 samples: time starts anew, the posture is that of the sample.
+posture() { # ROW: time and elevation there
+    awk -F '\t' -v row="$1" '$1 == "time" { for (i = 1; i <= NF; i++) { column[$i] = i } next }
+        FNR > 6 && $1 + 0 == $1 && ++rows == row { print $1, $column["q_Arm_RotX"] }' "$2"
+}
+"$sim" reference short.yaml --out dropped --set steps.0.drop=25 > out.txt 2> err.txt || fail "drop: $(cat err.txt)"
+echo "$(posture 26 result/short/reference.sto) $(posture 1 dropped/short/reference.sto)" \
+    "$(posture 76 dropped/short/reference.sto) $(posture 77 dropped/short/reference.sto)" |
+    awk '{ off = $2 - $4 } END { exit !($1 == 0.25 && $3 == 0 && off * off < 1e-8 && $5 == 0.75 && NF == 6) }' ||
+    fail "the dropped samples"
+
 # expect NAME STATUS 'TEXT IN THE MESSAGE' 'SED SCRIPT'
 expect() {
     write_config
@@ -80,6 +91,7 @@ expect crossed-bounds 2 "leaves nothing" 's/min: \[0.05\]/min: [0.5], max: [0.4]
 expect unknown-step 2 "'other' is no step before this one" 's/    toward: .*/    start: [other]/'
 expect unknown-key 2 "did you mean 'intervals'" 's/    intervals:/    interval:/'
 expect unknown-signal 2 "no signal 'torque'" 's/signal: qdot, value: \[0\], nodes: last/signal: torque, nodes: last/'
+expect all-dropped 2 'leave nothing' 's/    intervals:.*/    intervals: 20\n    drop: 20/'
 expect no-steps 2 'steps: a list' '/^steps/,$d'
 expect no-convergence 1 "step 'reach' did not converge in 3 iterations" 's/max_iterations: 300/max_iterations: 3/'
 expect impossible 1 "step 'reach'" "/signal: qdot, value: \[0\], to/a\\

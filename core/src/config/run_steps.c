@@ -18,6 +18,8 @@ static const mhe_option step_options[] = {
     MHE_OPT_MAP(mhi_step, targets, 0,
                 "Signal: earlier steps, one behind the other and separated by blanks, or a .sto."),
     MHE_OPT_TEXT(mhi_step, output, 0, NULL, "Folder of the result; none: for later steps alone."),
+    MHE_OPT_INT(mhi_step, drop, 0, 0, 1000000, "samples",
+                "Left out at the begin of the result, whose time then starts at 0."),
 };
 
 static const mhe_option bound_options[] = {
@@ -104,6 +106,11 @@ static mhe_status read_step(mhi_run *run, mhi_registry *registry, const mhi_step
     if (status == MHE_OK && mhi_step_find(steps, before, step->name) >= 0) {
         status =
             mhi_fail_at(err, MHE_E_CONFIG, run->tree, node, "there are two steps '%s'", step->name);
+    }
+    if (status == MHE_OK && step->drop >= step->intervals) {
+        status = mhi_fail_at(err, MHE_E_CONFIG, run->tree, node,
+                             "%s: drop: %d samples of a motion of %d intervals leave nothing",
+                             step->name, (int)step->drop, (int)step->intervals);
     }
     for (int32_t i = 0; i < step->start.n && status == MHE_OK; i++) {
         if (mhi_step_find(steps, before, step->start.values[i]) < 0) {

@@ -23,6 +23,7 @@ typedef struct mhi_step {
     mhe_text_map targets; /* signal -> earlier steps, joined, or a .sto file */
     mhe_real_list toward; /* posture that a start without earlier steps moves to [n_q] */
     const char *output;   /* folder of the result; NULL: only used by later steps */
+    int32_t drop;         /* nodes left out at the begin of the output; time is 0 behind them */
     mhi_use *costs;
     int32_t n_costs;
     mhi_step_bound *bounds;
