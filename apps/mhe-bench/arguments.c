@@ -18,7 +18,7 @@ const char arguments_help[] =
     "\n"
     "Each --vary multiplies the variants; the last one varies fastest, and ratios are to the "
     "first\n"
-    "variant. Without --vary the window varies: horizon.window=1,3,5,7,10,15,22. Layers are timed\n"
+    "variant. Without --vary the window varies: horizon.window=2,3,5,7,10,15,22. Layers are timed\n"
     "once for all windows. --repeats: how often each variant runs (5). --quick: two runs of at "
     "most\n"
     "25 estimates, and without --vary three windows. bench.json and the picture rate.svg go to "

@@ -77,7 +77,7 @@ static mhe_status measure(const arguments *a, const variants *v, const mhe_host 
 
 static mhe_status run(const arguments *a, const mhe_host *host, mhe_error *err) {
     const char *const windows[] = {a->quick ? "horizon.window=3,7,15"
-                                            : "horizon.window=1,3,5,7,10,15,22"};
+                                            : "horizon.window=2,3,5,7,10,15,22"};
     mhi_registry *registry = NULL;
     mhe_status status = mhi_registry_create(host, &registry, err);
     if (status != MHE_OK) {
