@@ -160,7 +160,7 @@ static void assignments(void **state) {
     assert_refused_set(BASE COSTS, "horizon.windw=3", MHE_E_CONFIG,
                        "--set: horizon: unknown key 'windw' (did you mean 'window'?)");
     assert_refused_set(BASE COSTS, "horizon.window=0", MHE_E_CONFIG,
-                       "--set: horizon: 'window' must lie in 1 .. 1000, not '0'");
+                       "--set: horizon: 'window' must lie in 2 .. 1000, not '0'");
     assert_refused_set(BASE COSTS, "formulation.x=0", MHE_E_CONFIG, /* a new section */
                        "--set: 'formulation' must be a text, not a mapping");
     assert_refused_set(BASE COSTS, "plugin_path.x=0", MHE_E_CONFIG,
