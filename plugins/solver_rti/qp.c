@@ -10,8 +10,8 @@
 #define LEAST_BARRIER 0.1 /* of the complementarity asked for */
 #define COLD_SLACK 0.1    /* least slack of a cold start */
 #define COLD_BARRIER 1.0  /* t z of a cold start */
-#define WARM_SLACK 1e-3   /* least slack and multiplier of a warm start */
-#define WARM_MULTIPLIER 1e-3
+#define WARM_SLACK 1e-2   /* least slack and multiplier of a warm start: few bounds change sides */
+#define WARM_MULTIPLIER 1e-4
 #define MAX_REGULARISATION 1e8
 
 size_t qp_size(const qp_shape *s) {
