@@ -6,8 +6,27 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Those behind the second are for commands with an input only. */
-static const char *const words[] = {"--out", "--set", "--help", "--input", "--rate"};
+#define WORDS_MAX 6
+
+/* Words of a command that takes this, into words [WORDS_MAX]. */
+static int32_t choose_words(int32_t takes, const char **words) {
+    static const struct {
+        const char *word;
+        int32_t needs;
+    } all[WORDS_MAX] = {{"--out", 0},
+                        {"--set", 0},
+                        {"--help", 0},
+                        {"--input", ARGUMENTS_INPUT},
+                        {"--rate", ARGUMENTS_INPUT},
+                        {"--no-cache", ARGUMENTS_CACHE}};
+    int32_t n = 0;
+    for (int32_t i = 0; i < WORDS_MAX; i++) {
+        if ((all[i].needs & ~takes) == 0) {
+            words[n++] = all[i].word;
+        }
+    }
+    return n;
+}
 
 static mhe_status read_rate(const char *text, double *rate, mhe_error *err) {
     char *end = NULL;
@@ -18,9 +37,10 @@ static mhe_status read_rate(const char *text, double *rate, mhe_error *err) {
     return MHE_OK;
 }
 
-static mhe_status take_option(const char *word, const char *value, int32_t takes_input,
-                              arguments *a, mhe_error *err) {
-    const int32_t n_words = takes_input ? 5 : 3;
+static mhe_status take_option(const char *word, const char *value, int32_t takes, arguments *a,
+                              mhe_error *err) {
+    const char *words[WORDS_MAX];
+    const int32_t n_words = choose_words(takes, words);
     int32_t known = 0;
     for (int32_t i = 0; i < n_words; i++) {
         known = known || strcmp(word, words[i]) == 0;
@@ -29,6 +49,10 @@ static mhe_status take_option(const char *word, const char *value, int32_t takes
         char hint[256];
         return mhe_fail(err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
                         mhi_suggest(hint, sizeof hint, word, words, n_words));
+    }
+    if (strcmp(word, "--no-cache") == 0) {
+        a->no_cache = 1;
+        return MHE_OK;
     }
     if (value == NULL) {
         return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", word);
@@ -44,8 +68,7 @@ static mhe_status take_option(const char *word, const char *value, int32_t takes
     return MHE_OK;
 }
 
-mhe_status arguments_parse(int argc, char **argv, int32_t takes_input, arguments *a,
-                           mhe_error *err) {
+mhe_status arguments_parse(int argc, char **argv, int32_t takes, arguments *a, mhe_error *err) {
     *a = (arguments){.rate = 100, .set = calloc((size_t)argc, sizeof(char *))};
     if (a->set == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
@@ -59,8 +82,8 @@ mhe_status arguments_parse(int argc, char **argv, int32_t takes_input, arguments
     mhe_status status = MHE_OK;
     for (int i = 2; i < argc && status == MHE_OK; i++) {
         if (argv[i][0] == '-') {
-            status = take_option(argv[i], i + 1 < argc ? argv[i + 1] : NULL, takes_input, a, err);
-            i++;
+            status = take_option(argv[i], i + 1 < argc ? argv[i + 1] : NULL, takes, a, err);
+            i += strcmp(argv[i], "--no-cache") != 0; /* the only one without a value */
         } else if (a->config != NULL) {
             status = mhe_fail(err, MHE_E_ARGUMENT, "one config file at a time: '%s' and '%s'",
                               a->config, argv[i]);
@@ -68,9 +91,10 @@ mhe_status arguments_parse(int argc, char **argv, int32_t takes_input, arguments
             a->config = argv[i];
         }
     }
-    if (status == MHE_OK && (a->config == NULL || (takes_input && a->input == NULL))) {
+    if (status == MHE_OK &&
+        (a->config == NULL || ((takes & ARGUMENTS_INPUT) && a->input == NULL))) {
         status = mhe_fail(err, MHE_E_ARGUMENT, "a config file%s needed; 'mhe-sim --help'",
-                          takes_input ? " and --input are" : " is");
+                          takes & ARGUMENTS_INPUT ? " and --input are" : " is");
     }
     return status;
 }

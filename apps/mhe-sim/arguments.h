@@ -12,13 +12,17 @@ typedef struct arguments {
     const char *out;   /* --out; NULL: ./out/<config name><suffix> */
     const char **set;  /* --set [n_set], points into argv */
     int32_t n_set;
-    int32_t help; /* --help: nothing else was looked at */
+    int32_t no_cache; /* --no-cache */
+    int32_t help;     /* --help: nothing else was looked at */
 } arguments;
 
-/* Reads the words from argv[2] on. `takes_input`: the command needs --input and takes --rate. Give
+/* What a command takes beyond --out and --set. */
+#define ARGUMENTS_INPUT 1 /* needs --input, takes --rate */
+#define ARGUMENTS_CACHE 2 /* --no-cache */
+
+/* Reads the words from argv[2] on; `takes`: ARGUMENTS_* or 0. Give
  * it back with arguments_free, also after a failure. MHE_E_ARGUMENT. */
-mhe_status arguments_parse(int argc, char **argv, int32_t takes_input, arguments *result,
-                           mhe_error *err);
+mhe_status arguments_parse(int argc, char **argv, int32_t takes, arguments *result, mhe_error *err);
 void arguments_free(arguments *a);
 
 /* The output folder, into out [size]: --out, or "out/<name><suffix>". */

@@ -28,6 +28,9 @@ static const char help[] =
     "reference: optimal motions, the config's steps one after the other; for every step with an\n"
     "output reference.sto, forces.sto, markers.trc and emg.sto in a folder of its own.\n"
     "'mhe-sim reference --help' shows every key of a step.\n"
+    "A step that was solved before, from the same config, model, files and program, is read back\n"
+    "from $XDG_CACHE_HOME/mhe (~/.cache/mhe), which may be deleted at any time; --no-cache\n"
+    "solves all steps and keeps none.\n"
     "\n"
     "noise: markers.trc and emg.sto as instruments with errors would have recorded them of such\n"
     "a reference.sto; noise.yaml says what was applied, noise.svg shows it.\n"
@@ -93,14 +96,16 @@ static mhe_status run_noise(const call *c, mhe_error *err) {
 
 static mhe_status run_reference(const call *c, mhe_error *err) {
     const arguments *a = c->arguments;
-    const reference_setup setup = {a->config, a->set, a->n_set, c->host, c->registry, a->out};
+    const reference_setup setup = {a->config,   a->set, a->n_set,    c->host,
+                                   c->registry, a->out, !a->no_cache};
     return reference_run(&setup, err);
 }
 
 static mhe_status help_reference(mhe_error *err) {
     mhi_text text = {0};
     reference_describe(&text);
-    (void)fputs("mhe-sim reference CONFIG.yaml [--out DIR] [--set path.to.key=value]...\n\n"
+    (void)fputs("mhe-sim reference CONFIG.yaml [--out DIR] [--set path.to.key=value]... "
+                "[--no-cache]\n\n"
                 "The config has a list 'steps' in place of 'costs'; each step has a list 'costs' "
                 "and may have a\nlist 'bounds'.\n\n",
                 stdout);
@@ -124,12 +129,12 @@ static mhe_status help_noise(mhe_error *err) {
 
 static const struct command {
     const char *name;
-    int32_t takes_input; /* --input and --rate */
+    int32_t takes; /* ARGUMENTS_* */
     mhe_status (*run)(const call *c, mhe_error *err);
     mhe_status (*help)(mhe_error *err);
-} commands[] = {{"forward", 1, run_forward, help_motion},
-                {"follow", 1, run_follow, help_motion},
-                {"reference", 0, run_reference, help_reference},
+} commands[] = {{"forward", ARGUMENTS_INPUT, run_forward, help_motion},
+                {"follow", ARGUMENTS_INPUT, run_follow, help_motion},
+                {"reference", ARGUMENTS_CACHE, run_reference, help_reference},
                 {"noise", 0, run_noise, help_noise}};
 #define N_COMMANDS ((int32_t)(sizeof commands / sizeof commands[0]))
 
@@ -138,7 +143,7 @@ static mhe_status run_command(const struct command *command, int argc, char **ar
     const mhe_host host = console_host("mhe-sim");
     arguments a;
     call c = {&a, &host, NULL};
-    mhe_status status = arguments_parse(argc, argv, command->takes_input, &a, err);
+    mhe_status status = arguments_parse(argc, argv, command->takes, &a, err);
     if (status == MHE_OK && a.help) {
         status = command->help(err);
     } else if (status == MHE_OK) {

@@ -13,6 +13,7 @@ typedef struct reference_setup {
     const mhe_host *host;
     mhi_registry *registry;
     const char *out; /* folder of results; NULL: out/<config name> */
+    int32_t cache;   /* steps that were solved before are read back */
 } reference_setup;
 
 /* Solves all steps, then integrates those with an `output` with CVODES and writes what an

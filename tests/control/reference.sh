@@ -8,6 +8,7 @@ model=$2/models/arm19/arm19.osim
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 cd "$work" || exit 1
+export XDG_CACHE_HOME="$work/cache"
 failed=0
 
 fail() {
@@ -71,6 +72,37 @@ echo "$(posture 26 result/short/reference.sto) $(posture 1 dropped/short/referen
     "$(posture 76 dropped/short/reference.sto) $(posture 77 dropped/short/reference.sto)" |
     awk '{ off = $2 - $4 } END { exit !($1 == 0.25 && $3 == 0 && off * off < 1e-8 && $5 == 0.75 && NF == 6) }' ||
     fail "the dropped samples"
+
+# What was solved before is read back, to the bit; a damaged file, other inputs and --no-cache are solved.
+# solved NAME 1|0 ARGUMENTS...
+solved() {
+    name=$1
+    before=$2
+    shift 2
+    "$sim" reference short.yaml --out again "$@" > out.txt 2> err.txt || fail "cache, $name: $(cat err.txt)"
+    [ "$(grep -c 'solved before' out.txt)" -eq "$before" ] || fail "cache, $name: $(cat out.txt)"
+}
+solved same 1
+for file in reference.sto forces.sto markers.trc emg.sto; do
+    cmp -s "result/short/$file" "again/short/$file" || fail "$file of a motion that was read back"
+done
+solved no-cache 0 --no-cache
+solved bound 0 --set 'steps.0.bounds.2.min=[0.06]'
+cp "$model" other.osim
+solved model-file 0 --set model.file="$work/other.osim"
+solved model-file 1 --set model.file="$work/other.osim"
+sed -i 's#<max_isometric_force>#<max_isometric_force> #' other.osim
+solved model-contents 0 --set model.file="$work/other.osim"
+for file in cache/mhe/*.solution; do
+    printf '%s' "$(tr '7' '8' < "$file")" > "$file"
+done
+solved damaged 0
+solved repaired 1
+for file in cache/mhe/*.solution; do
+    : > "$file"
+done
+solved empty 0
+rm -rf again
 
 # expect NAME STATUS 'TEXT IN THE MESSAGE' 'SED SCRIPT'
 expect() {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* step.c: a step's problem from its config: bounds, start, solve. */
+#include "control/solution_cache.h"
 #include "control/step_private.h"
 #include "plugin/instance.h"
 
@@ -256,6 +257,44 @@ static mhe_status solve(mhi_step_work *w, mhi_trajectory *t, mhe_solve_info *inf
     return status == MHE_OK ? MHE_OK : mhi_step_fail(w, status, err, "%s", why.text);
 }
 
+static void store(const mhi_step_work *w, const mhi_text *key, const mhi_trajectory *t,
+                  const mhe_solve_info *info) {
+    const mhe_host *host = w->setup->host;
+    mhe_error why = {0};
+    if (info->outcome == MHE_SOLVE_CONVERGED &&
+        mhi_solution_write(w->setup->cache, key, t, info, &why) != MHE_OK) {
+        char text[1200];
+        (void)snprintf(text, sizeof text, "step '%s' is not kept for the next time: %s",
+                       w->step->name, why.text);
+        host->log(host, MHE_LOG_WARNING, text);
+    }
+}
+
+/* A step that was solved before, from the very same, is read back. */
+static mhe_status solve_once(mhi_step_work *w, mhi_trajectory *t, mhe_solve_info *info,
+                             mhe_error *err) {
+    const mhi_step_setup *s = w->setup;
+    mhi_text key = {0};
+    mhe_error why = {0};
+    const int32_t keyed = s->cache != NULL && mhi_solution_key(s, &key, &why) == MHE_OK;
+    const int32_t known = keyed && mhi_solution_read(s->cache, &key, t, info);
+    mhe_status status = MHE_OK;
+    if (s->read_back != NULL) {
+        *s->read_back = known;
+    }
+    if (!known) {
+        status = w->step->start.n > 0 ? start_from_steps(w, t, err) : start_anew(w, t, err);
+        if (status == MHE_OK) {
+            status = solve(w, t, info, err);
+        }
+        if (status == MHE_OK && keyed) {
+            store(w, &key, t, info);
+        }
+    }
+    mhi_text_free(&key);
+    return status;
+}
+
 /* A and B of every interval. */
 static mhe_status linearise(mhi_step_work *w, mhi_arena *arena, mhi_trajectory *t, mhe_error *err) {
     const mhe_stage_problem *face = mhi_ocp_face(w->ocp);
@@ -294,11 +333,7 @@ mhe_status mhi_step_solve(const mhi_step_setup *setup, mhi_arena *arena, mhi_tra
         status = mhi_step_targets(&w, err);
     }
     if (status == MHE_OK) {
-        status =
-            w.step->start.n > 0 ? start_from_steps(&w, result, err) : start_anew(&w, result, err);
-    }
-    if (status == MHE_OK) {
-        status = solve(&w, result, info, err);
+        status = solve_once(&w, result, info, err);
     }
     if (status == MHE_OK && setup->linearise) {
         status = linearise(&w, arena, result, err);

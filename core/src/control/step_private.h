@@ -20,6 +20,9 @@ typedef struct mhi_step_work {
 /* Results of the steps with these names, one entry each. */
 const mhi_trajectory **mhi_step_motions(mhi_step_work *w, const char *const *names, int32_t n);
 
+/* Whether a target's source is a file, else names of steps. */
+int32_t mhi_step_is_file(const char *source);
+
 /* Targets of all signals that the step's config names. */
 mhe_status mhi_step_targets(mhi_step_work *w, mhe_error *err);
 

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-static int32_t is_file(const char *source) {
+int32_t mhi_step_is_file(const char *source) {
     const char *dot = strrchr(source, '.');
     return dot != NULL && (strcmp(dot, ".sto") == 0 || strcmp(dot, ".mot") == 0);
 }
@@ -107,7 +107,7 @@ mhe_status mhi_step_targets(mhi_step_work *w, mhe_error *err) {
                                  "residual_torque of this problem",
                                  signal);
         }
-        status = (is_file(source) ? from_file : from_steps)(w, signal, &part, source, err);
+        status = (mhi_step_is_file(source) ? from_file : from_steps)(w, signal, &part, source, err);
     }
     return status;
 }
