@@ -252,18 +252,17 @@ static void joints_of_fixed_kind(void **state) {
 
 static void bodies_come_after_their_parents(void **state) {
     (void)state;
-    mhe_description *d =
-        parse(DOCUMENT("40000", SET("BodySet", BODY("hand") BODY("arm")) SET(
-                                    "JointSet",
-                                    "<PinJoint name=\"wrist\">" SOCKETS(
-                                        "/bodyset/arm",
-                                        "/bodyset/hand") "</PinJoint>\n<PinJoint "
-                                                         "name=\"shoulder\">" SOCKETS("../ground",
-                                                                                      "/bodyset/"
-                                                                                      "arm") "</"
-                                                                                             "PinJo"
-                                                                                             "int>"
-                                                                                             "\n")));
+    mhe_description *d = parse(DOCUMENT(
+        "40000",
+        SET("BodySet", BODY("hand") BODY("arm"))
+            SET("JointSet", "<PinJoint name=\"wrist\">" SOCKETS(
+                                "/bodyset/arm", "/bodyset/hand") "</PinJoint>\n<PinJoint "
+                                                                 "name=\"shoulder\">" SOCKETS(
+                                                                     "../ground", "/bodyset/"
+                                                                                  "arm") "</"
+                                                                                         "PinJo"
+                                                                                         "int>"
+                                                                                         "\n")));
     assert_string_equal(d->bodies[0].name, "arm");
     assert_string_equal(d->bodies[1].name, "hand");
     assert_int_equal(d->bodies[1].parent, 0);
