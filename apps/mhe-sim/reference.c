@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "reference.h"
 
+#include "reference_picture.h"
 #include "reference_track.h"
 
 #include "control/step.h"
@@ -21,6 +22,7 @@ typedef struct reference {
     int32_t n_steps;
     mhi_trajectory *done;    /* [n_steps] */
     simulation *simulations; /* [n_steps], of steps with an output */
+    const char *out;         /* folder */
     const char *cache;       /* folder; NULL: none */
     mhi_arena arena;
 } reference;
@@ -64,10 +66,11 @@ static mhe_status open_all(reference *r, mhe_error *err) {
         status = mhi_run_read_steps(r->run, s->registry, &r->steps, &r->n_steps, err);
     }
     if (status == MHE_OK) {
+        r->out = s->out != NULL ? s->out : mhi_arena_format(&r->arena, "out/%s", r->run->name);
         r->cache = s->cache ? cache_folder(&r->arena) : NULL;
         r->done = MHI_TAKE(&r->arena, mhi_trajectory, r->n_steps);
         r->simulations = MHI_TAKE(&r->arena, simulation, r->n_steps);
-        status = r->done == NULL || r->simulations == NULL
+        status = r->done == NULL || r->simulations == NULL || r->out == NULL
                      ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                      : mhi_estimator_create(r->run, s->host, &r->estimator, err);
     }
@@ -173,8 +176,7 @@ static mhe_status integrate(reference *r, int32_t number, mhe_error *err) {
     if (interrupted) {
         return interruption(step, err);
     }
-    (void)snprintf(folder, sizeof folder, "%s%s/%s", r->setup->out == NULL ? "out/" : "",
-                   r->setup->out == NULL ? r->run->name : r->setup->out, step->output);
+    (void)snprintf(folder, sizeof folder, "%s/%s", r->out, step->output);
     mhe_status status =
         simulation_open(s, r->run, mhi_estimator_system(r->estimator), r->setup->host,
                         r->setup->registry, step->intervals / step->duration, err);
@@ -207,6 +209,23 @@ static mhe_status commit(reference *r, mhe_error *err) {
     return status;
 }
 
+/* Results without their picture are complete. */
+static void draw(reference *r) {
+    const mhe_system *system = mhi_system_face(mhi_estimator_system(r->estimator));
+    const char **outputs = MHI_TAKE(&r->arena, const char *, r->n_steps);
+    mhe_error why = {0};
+    int32_t n = 0;
+    for (int32_t i = 0; i < r->n_steps && outputs != NULL; i++) {
+        if (has_output(&r->steps[i])) {
+            outputs[n++] = r->steps[i].output;
+        }
+    }
+    if (r->run->output.picture && n > 0 &&
+        reference_picture(r->out, outputs, n, system->n_q, system->n_m, &why) != MHE_OK) {
+        r->setup->host->log(r->setup->host, MHE_LOG_WARNING, why.text);
+    }
+}
+
 mhe_status reference_run(const reference_setup *setup, mhe_error *err) {
     reference r = {.setup = setup};
     const struct sigaction stop = {.sa_handler = on_interrupt, .sa_flags = (int)SA_RESETHAND};
@@ -220,6 +239,9 @@ mhe_status reference_run(const reference_setup *setup, mhe_error *err) {
     }
     if (status == MHE_OK) {
         status = commit(&r, err);
+    }
+    if (status == MHE_OK) {
+        draw(&r);
     }
     for (int32_t i = 0; i < r.n_steps && r.simulations != NULL; i++) {
         simulation_close(&r.simulations[i]);

@@ -48,6 +48,11 @@ cat out.txt
 for file in reference.sto forces.sto markers.trc emg.sto; do
     [ -s "result/short/$file" ] || fail "no $file"
 done
+if command -v gnuplot > /dev/null; then
+    [ "$(grep -c '^set title\|^plot' result/motion.gp)" -ge 12 ] && grep -q '</svg>' result/motion.svg || fail "no picture"
+fi
+"$sim" reference short.yaml --out plain --set output.picture=false > out2.txt 2> err.txt || fail "no picture: $(cat err.txt)"
+find plain -name 'motion*' | grep . && fail "a picture nobody asked for"
 find result -name '.*' -type f | grep . && fail "temporary files are left"
 # The feedback is small and leaves the motion on its solution.
 awk '/feedback up to/ { for (i = 1; i < NF; i++) {
