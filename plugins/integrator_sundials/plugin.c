@@ -6,7 +6,7 @@ static const mhe_option flow_options[] = {
     MHE_OPT_ENUM(
         struct flow_config, method, "bdf", "bdf|adams",
         "Backward differentiation formulas, or Adams-Moulton for systems that are not stiff."),
-    MHE_OPT_REAL(struct flow_config, rtol, 1e-8, 1e-14, 1e-2, "1", "Relative tolerance."),
+    MHE_OPT_REAL(struct flow_config, rtol, 1e-9, 1e-14, 1e-2, "1", "Relative tolerance."),
     MHE_OPT_REAL(struct flow_config, atol, 1e-10, 1e-16, 1e-2, "1",
                  "Absolute tolerance of states and sensitivities, in their units."),
     MHE_OPT_INT(struct flow_config, max_steps, 20000, 1, 1e9, "1",
