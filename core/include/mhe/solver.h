@@ -105,6 +105,12 @@ typedef struct mhe_solver_ops {
      * info->outcome. `control` may be NULL. [cold] */
     mhe_status (*solve)(void *self, const mhe_solve_control *control, mhe_solution *solution,
                         mhe_solve_info *info, mhe_error *err);
+    /* May be NULL. Does ahead what the next solve() needs and no measurement changes: x_next, A and
+     * B of every interval at `start` (x and u; nothing else is read). A solve() that then starts
+     * from the same x and u, bit by bit, goes on from there, any other evaluates anew; the result
+     * is the same. So the time from a measurement to its estimate holds costs and steps only. A
+     * point without values is no error: solve() will meet it. [hot] */
+    mhe_status (*prepare)(void *self, const mhe_solution *start, mhe_error *err);
 } mhe_solver_ops;
 
 #ifdef __cplusplus
