@@ -306,8 +306,9 @@ AT(mhe_solve_info, kkt_residual, 24);
 AT(mhe_solve_info, primal_residual, 32);
 AT(mhe_solve_info, evaluation_time, 40);
 
-SIZE(mhe_solver_ops, 32);
+SIZE(mhe_solver_ops, 40);
 AT(mhe_solver_ops, size, 0);
 AT(mhe_solver_ops, create, 8);
 AT(mhe_solver_ops, destroy, 16);
 AT(mhe_solver_ops, solve, 24);
+AT(mhe_solver_ops, prepare, 32);
