@@ -80,6 +80,16 @@ static void add_times(cJSON *root, const summary *s) {
     add_number(ms, "max", percentile(s, 1));
 }
 
+/* Where raw EMG was processed: what that takes. */
+static void add_emg(cJSON *root, const mhi_emg_report *emg) {
+    cJSON *o = cJSON_AddObjectToObject(root, "emg");
+    add_number(o, "channels", emg->n_channels);
+    add_number(o, "rate_hz", emg->rate);
+    add_number(o, "offset_ms", 1e3 * emg->offset);
+    add_number(o, "filter_delay_ms", 1e3 * emg->filter_delay);
+    add_number(o, "lag_ms", 1e3 * emg->lag);
+}
+
 mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
     measure_sort(s->solve_ms, s->n_solves);
     cJSON *root = cJSON_CreateObject();
@@ -103,6 +113,9 @@ mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error
     add_number(iterations, "max", s->iterations_max);
     add_number(root, "deadline_misses", s->n_deadline);
     add_number(root, "peak_rss_mb", peak_rss_mb());
+    if (s->emg.n_channels > 0) {
+        add_emg(root, &s->emg);
+    }
     if (s->has_rmse) {
         add_rmse(root, &s->rmse);
     }
@@ -117,6 +130,9 @@ mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error
 }
 
 void summary_lines(const summary *s, mhi_text *out) {
+    if (s->emg.n_channels > 0) {
+        mhi_text_add(out, "%s\n", s->alignment);
+    }
     mhi_text_add(out, "%d frames, %d solves, %.2f %% converged\n", s->n_pushed, s->n_solves,
                  s->n_solves == 0 ? 0.0 : 100.0 * s->n_converged / s->n_solves);
     if (s->n_solves > 0) {

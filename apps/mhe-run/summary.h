@@ -17,6 +17,8 @@ typedef struct summary {
     double *solve_ms; /* [capacity >= n_solves], owned */
     int32_t capacity;
     double elapsed; /* s, whole loop */
+    mhi_emg_report emg;
+    const char *alignment; /* a line, or NULL */
     int32_t has_rmse;
     mhi_rmse rmse;
 } summary;

@@ -45,6 +45,8 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
     }
     if (status == MHE_OK && !s->check_only) {
         t->summary.n_frames = t->recording->n_frames;
+        t->summary.emg = t->recording->emg_report;
+        t->summary.alignment = t->recording->alignment;
         status = mhi_outbox_open(s->out, &t->outbox, err);
     }
     if (status == MHE_OK && !s->check_only) {

@@ -115,6 +115,74 @@ static void defaults_of_the_core(void **state) {
     release(&o);
 }
 
+static void electrodes_of_the_file(void **state) {
+    (void)state;
+    static const char emg[] =
+        BASE COSTS "formulation: activation\n"
+                   "data: {emg: raw.sto}\n"
+                   "emg:\n  low_pass: 4\n  envelope: rms\n  mvc_file: mvc.sto\n  channels:\n"
+                   "    - {name: Pec, muscles: [a, b], gains: [1, 0.5], mvc: 0.01}\n"
+                   "    - {name: \"7\", muscles: c, gain: 2}\n";
+    struct outcome o = read_good(emg, NULL, 0);
+    const mhi_emg_section *e = &o.run->emg;
+    assert_int_equal(o.run->data.emg_delay, 0); /* the filters' delay stands in for it */
+    assert_true(e->delay == 0.02 && e->low_pass == 4 && e->band_low == 20 && e->process == 1);
+    assert_int_equal(e->envelope, MHI_EMG_RMS);
+    assert_string_equal(e->mvc_file, TEST_FOLDER "/mvc.sto");
+    assert_int_equal(e->n_channels, 2);
+    assert_string_equal(e->channels[0].name, "Pec");
+    assert_int_equal(e->channels[0].muscles.n, 2);
+    assert_true(e->channels[0].gains.values[1] == 0.5 && e->channels[0].mvc == 0.01);
+    assert_string_equal(e->channels[1].name, "7");
+    assert_string_equal(e->channels[1].muscles.values[0], "c");
+    assert_true(e->channels[1].gain == 2 && e->channels[1].mvc == 0);
+    mhi_text first = {0}, second = {0};
+    mhi_run_write(o.run, &first);
+    release(&o);
+    o = read_good(first.data, NULL, 0);
+    mhi_run_write(o.run, &second);
+    assert_string_equal(first.data, second.data);
+    mhi_text_free(&first);
+    mhi_text_free(&second);
+    release(&o);
+    const char *set = "emg.channels.1.mvc=3";
+    o = read_good(emg, &set, 1);
+    assert_true(o.run->emg.channels[1].mvc == 3);
+    release(&o);
+}
+
+static void bad_electrodes(void **state) {
+    (void)state;
+    assert_refused(BASE COSTS "emg: {low_pass: 4}\n",
+                   ":7: emg: 'channels' is missing, the list of electrodes: [{name: COLUMN, "
+                   "muscles: [MUSCLE, ...], mvc: NUMBER}, ...]");
+    assert_refused(BASE COSTS "emg: {lowpass: 4, channels: []}\n",
+                   ":7: emg: unknown key 'lowpass' (did you mean 'low_pass'?)");
+    assert_refused(BASE COSTS "emg: {channels: {a: b}}\n",
+                   ":7: emg.channels: must be a list: [{name: COLUMN, muscles: [MUSCLE, ...]}, "
+                   "...]");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n    - {name: a}\n",
+                   ":10: emg.channels: the key 'muscles' is missing: Muscles it stands for.");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
+                              "    - {name: a, muscles: [x, y], gains: [1]}\n",
+                   ":10: emg.channels: channel 'a' has 1 gains for 2 muscles");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
+                              "    - {name: a, muscles: []}\n",
+                   ":10: emg.channels: channel 'a' names no muscle");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
+                              "    - {name: a, muscles: x}\n    - {name: a, muscles: y}\n",
+                   ":11: emg.channels: channel 'a' is there twice; one entry lists all of its "
+                   "muscles");
+    assert_refused(BASE COSTS "emg:\n  channels:\n    - {name: a, muscles: x}\n",
+                   ":7: emg: there are channels, but data.emg names no file");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\n"
+                              "emg: {band_low: 500, channels: [{name: a, muscles: x}]}\n",
+                   ":8: emg: 'band_low' is 500 Hz, which is not below 'band_high', 450 Hz");
+    struct outcome o = read_good(BASE COSTS "emg:\n", NULL, 0);
+    assert_int_equal(o.run->emg.n_channels, 0);
+    release(&o);
+}
+
 static void values_of_the_file(void **state) {
     (void)state;
     struct outcome o = read_good(
@@ -308,7 +376,7 @@ static void tables_are_documented(void **state) {
     (void)state;
     int32_t n = 0, n_options = 0;
     const mhi_section *sections = mhi_run_sections(&n);
-    assert_int_equal(n, 11);
+    assert_int_equal(n, 13);
     for (int32_t i = 0; i < n; i++) {
         mhe_error err = {0};
         mhi_options_check(sections[i].options, sections[i].n_options, 4096, &err);
@@ -328,11 +396,18 @@ static void tables_are_documented(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(defaults_of_the_core),  cmocka_unit_test(values_of_the_file),
-        cmocka_unit_test(assignments),           cmocka_unit_test(wrong_sections),
-        cmocka_unit_test(wrong_plugin_sections), cmocka_unit_test(unknown_plugins),
-        cmocka_unit_test(unreadable_file),       cmocka_unit_test(absent_plugin_folder),
-        cmocka_unit_test(relative_file_name),    cmocka_unit_test(resolved_run_reads_back),
+        cmocka_unit_test(electrodes_of_the_file),
+        cmocka_unit_test(bad_electrodes),
+        cmocka_unit_test(defaults_of_the_core),
+        cmocka_unit_test(values_of_the_file),
+        cmocka_unit_test(assignments),
+        cmocka_unit_test(wrong_sections),
+        cmocka_unit_test(wrong_plugin_sections),
+        cmocka_unit_test(unknown_plugins),
+        cmocka_unit_test(unreadable_file),
+        cmocka_unit_test(absent_plugin_folder),
+        cmocka_unit_test(relative_file_name),
+        cmocka_unit_test(resolved_run_reads_back),
         cmocka_unit_test(tables_are_documented),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

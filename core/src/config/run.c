@@ -112,13 +112,16 @@ static mhe_status read_top(const struct reader *r) {
     if (names == NULL) {
         return no_memory(r);
     }
+    int32_t n_names = 0;
     for (int32_t i = 1; i < n; i++) { /* 0 is the top level itself */
         const int costs = strcmp(sections[i].name, "costs") == 0;
-        names[i - 1] = costs && r->scope == SCOPE_STEPS ? "steps" : sections[i].name;
+        if (strchr(sections[i].name, '.') == NULL) {
+            names[n_names++] = costs && r->scope == SCOPE_STEPS ? "steps" : sections[i].name;
+        }
     }
     mhi_top_section top = {0};
     mhe_status status = mhi_options_fill(options, n_top, run->tree, mhi_tree_root(run->tree), names,
-                                         n - 1, NULL, run->dir, &run->arena, &top, r->err);
+                                         n_names, NULL, run->dir, &run->arena, &top, r->err);
     if (status != MHE_OK) {
         return status;
     }
@@ -150,12 +153,14 @@ static mhe_status read_plain_sections(const struct reader *r) {
     mhe_status status = MHE_OK;
     for (const mhi_section *end = s + n; s < end && status == MHE_OK; s++) {
         if (s->iface == NULL && s->offset != 0) {
-            status = mhi_options_fill(s->options, s->n_options, run->tree,
-                                      section_node(run, s->name), NULL, 0, s->name, run->dir,
-                                      &run->arena, (unsigned char *)run + s->offset, r->err);
+            static const char *const lists[] = {"channels"}; /* mappings within a section */
+            const int has_list = s->offset == offsetof(mhi_run, emg);
+            status = mhi_options_fill(
+                s->options, s->n_options, run->tree, section_node(run, s->name), lists, has_list,
+                s->name, run->dir, &run->arena, (unsigned char *)run + s->offset, r->err);
         }
     }
-    return status;
+    return status == MHE_OK ? mhi_run_read_channels(run, r->err) : status;
 }
 
 /* ---- sections with a plugin ---- */
@@ -314,8 +319,12 @@ static mhe_status check_run(const struct reader *r) {
         return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, section_node(run, "bounds"),
                            "bounds: '%s_min' is above '%s_max'", name, name);
     }
+    const int by_activation = run->formulation == MHE_FORMULATION_ACTIVATION;
     if (run->data.emg_delay < 0) {
-        run->data.emg_delay = run->formulation == MHE_FORMULATION_ACTIVATION ? 2 : 0;
+        run->data.emg_delay = by_activation && run->emg.n_channels == 0 ? 2 : 0;
+    }
+    if (run->emg.delay < 0) {
+        run->emg.delay = by_activation ? 0.02 : 0;
     }
     return MHE_OK;
 }

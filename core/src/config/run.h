@@ -31,9 +31,44 @@ typedef struct mhi_model_section {
 
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
-    int32_t emg_delay; /* samples by which the tracked EMG lags: activation-driven default 2,
-                        * excitation-driven 0 (-1 in the file = by formulation) */
+    double emg_offset;                     /* s, added to the EMG file's times */
+    int32_t emg_delay; /* frames by which the tracked EMG lags: activation-driven default 2,
+                        * excitation-driven and with electrodes 0 (-1 in the file = by default) */
 } mhi_data_section;
+
+#define MHI_EMG_LOW_PASS 0
+#define MHI_EMG_AVERAGE 1
+#define MHI_EMG_RMS 2
+#define MHI_EMG_NO_ENVELOPE 3
+
+/* One electrode: a column of data.emg, and the muscles it stands for. */
+typedef struct mhi_emg_channel {
+    const char *name;
+    mhe_text_list muscles;
+    mhe_real_list gains; /* one a muscle; n = 0: all 1 */
+    double gain;
+    double mvc; /* envelope at maximal voluntary contraction; 0: from mvc_file, else 1 */
+    const mhi_node *node;
+} mhi_emg_channel;
+
+/* From electrodes to muscles; without channels the columns of data.emg are muscles, and this
+ * section does nothing. */
+typedef struct mhi_emg_section {
+    int32_t process; /* 0: the columns are envelopes */
+    int32_t band_order;
+    double band_low, band_high; /* Hz */
+    int32_t envelope;           /* MHI_EMG_* */
+    int32_t low_pass_order;
+    double low_pass; /* Hz */
+    double window;   /* s, of average and rms */
+    int32_t zero_phase;
+    double delay; /* s; -1: by formulation, resolved when read */
+    double max;   /* largest value handed on */
+    double rate;  /* Hz, of the frames where there are no markers */
+    const char *mvc_file;
+    mhi_emg_channel *channels;
+    int32_t n_channels;
+} mhi_emg_section;
 
 typedef struct mhi_initial_section {
     mhe_real_list q, qdot; /* n = 0: from the reference, else free within bounds */
@@ -68,6 +103,7 @@ typedef struct mhi_run {
     mhe_text_list plugin_path; /* absolute folders */
     mhi_model_section model_file;
     mhi_data_section data;
+    mhi_emg_section emg;
     mhi_initial_section initial;
     mhi_horizon_section horizon;
     mhi_bounds_section bounds;
@@ -87,7 +123,8 @@ typedef struct mhi_section {
                       * costs */
 } mhi_section;
 
-/* All sections in the order in which they are written. "costs" is a list of such sections. [any] */
+/* All sections in the order in which they are written. "costs" is a list of such sections, and
+ * "a.b" stands for such a list `b` within section `a`. [any] */
 const mhi_section *mhi_run_sections(int32_t *n);
 /* Option table of a section; NULL if there is none of that name. [any] */
 const mhe_option *mhi_run_section(const char *section, int32_t *n);

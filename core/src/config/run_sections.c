@@ -33,12 +33,54 @@ static const mhe_option muscle_options[] = {
 
 static const mhe_option data_options[] = {
     MHE_OPT_PATH(mhi_data_section, markers, 0, "Measured markers, .trc."),
-    MHE_OPT_PATH(mhi_data_section, emg, 0, "Processed EMG or excitations, 0 to 1, .sto or .mot."),
+    MHE_OPT_PATH(mhi_data_section, emg, 0,
+                 "EMG, .sto or .mot: normalised, a column a muscle; or raw, a column an electrode, "
+                 "with emg.channels."),
     MHE_OPT_PATH(mhi_data_section, reference, 0,
                  "Known motion to start from and to compare with, .sto."),
+    MHE_OPT_REAL(mhi_data_section, emg_offset, 0, -1e6, 1e6, "s",
+                 "Added to the times of the EMG file, to meet those of the markers."),
     MHE_OPT_INT(mhi_data_section, emg_delay, -1, -1, 1000, "samples",
-                "Samples by which the tracked EMG lags behind; -1: 0 when excitation-driven, 2 "
-                "when activation-driven."),
+                "Samples by which the tracked EMG lags behind; -1: 0 when excitation-driven or "
+                "with emg.channels, 2 when activation-driven."),
+};
+
+static const mhe_option emg_options[] = {
+    MHE_OPT_BOOL(mhi_emg_section, process, 1,
+                 "Band-pass, rectify and smooth; false: the columns are envelopes."),
+    MHE_OPT_INT(mhi_emg_section, band_order, 2, 0, 8, "1",
+                "Order of the Butterworth band-pass (two poles each, as in scipy and MATLAB); 0: "
+                "none."),
+    MHE_OPT_REAL(mhi_emg_section, band_low, 20, 1e-3, 1e6, "Hz", "Its lower corner."),
+    MHE_OPT_REAL(mhi_emg_section, band_high, 450, 1e-3, 1e6, "Hz", "Its upper corner."),
+    MHE_OPT_ENUM(mhi_emg_section, envelope, "lowpass", "lowpass|average|rms|none",
+                 "How the rectified signal is smoothed: Butterworth low-pass, moving average, "
+                 "moving RMS, or not at all."),
+    MHE_OPT_INT(mhi_emg_section, low_pass_order, 2, 1, 8, "1", "Order of the low-pass."),
+    MHE_OPT_REAL(mhi_emg_section, low_pass, 6, 1e-3, 1e6, "Hz", "Corner of the low-pass."),
+    MHE_OPT_REAL(mhi_emg_section, window, 0.1, 1e-4, 60, "s", "Length of average and RMS."),
+    MHE_OPT_BOOL(mhi_emg_section, zero_phase, 0,
+                 "Filter forwards and backwards, without delay; for recordings only, since it "
+                 "looks ahead."),
+    MHE_OPT_REAL(mhi_emg_section, delay, -1, -1, 1, "s",
+                 "Electromechanical delay from EMG to activation, of which the filters' own delay "
+                 "makes up a part; -1: 0 when excitation-driven, 0.02 when activation-driven."),
+    MHE_OPT_REAL(mhi_emg_section, max, 1, 1e-3, DBL_MAX, "1", "Values above are cut to it."),
+    MHE_OPT_REAL(mhi_emg_section, rate, 100, 1e-3, 1e5, "Hz",
+                 "Rate of the frames where there are no markers."),
+    MHE_OPT_PATH(mhi_emg_section, mvc_file, 0,
+                 "EMG of maximal contractions with the same columns: the envelope's maximum is the "
+                 "MVC; or a single row of MVC values."),
+};
+
+static const mhe_option channel_options[] = {
+    MHE_OPT_TEXT(mhi_emg_channel, name, MHE_OPT_REQUIRED, NULL, "Column of data.emg."),
+    MHE_OPT_TEXTS(mhi_emg_channel, muscles, MHE_OPT_REQUIRED, "Muscles it stands for."),
+    MHE_OPT_REALS(mhi_emg_channel, gains, 0, 0, 1e6, "1",
+                  "Factor of each of these muscles; none: all 1."),
+    MHE_OPT_REAL(mhi_emg_channel, gain, 1, 0, 1e6, "1", "Factor of the whole channel."),
+    MHE_OPT_REAL(mhi_emg_channel, mvc, 0, 0, DBL_MAX, "unit of the column",
+                 "Envelope at maximal voluntary contraction; 0: from mvc_file, else 1."),
 };
 
 static const mhe_option initial_options[] = {
@@ -104,6 +146,10 @@ static const mhi_section sections[] = {
     SECTION("muscle", "Forces and activation dynamics of the muscles.", MHE_MUSCLE_IFACE,
             muscle_options, AT(muscle)),
     SECTION("data", "Measured motion.", NULL, data_options, AT(data)),
+    SECTION("emg", "From electrodes to muscles; to be given with channels.", NULL, emg_options,
+            AT(emg)),
+    SECTION("emg.channels", "A list: the electrodes. Muscles that none of them names have no EMG.",
+            NULL, channel_options, 0),
     SECTION("initial", "Start of the motion.", NULL, initial_options, AT(initial)),
     SECTION("horizon", "The moving window.", NULL, horizon_options, AT(horizon)),
     SECTION("bounds", "Bounds of states and controls.", NULL, bounds_options, AT(bounds)),

@@ -19,4 +19,9 @@ typedef struct mhi_use_section {
     double weight, sigma; /* costs */
 } mhi_use_section;
 
+/* The list `channels` of the emg section, and what its keys must agree on (run_emg.c). [cold] */
+mhe_status mhi_run_read_channels(mhi_run *run, mhe_error *err);
+/* That list as YAML, within its section. */
+void mhi_run_write_channels(const mhi_run *run, mhi_text *out);
+
 #endif

@@ -50,6 +50,10 @@ void mhi_run_write(const mhi_run *run, mhi_text *out) {
             continue;
         }
         const void *part = (const unsigned char *)run + s->offset;
+        if (strcmp(s->name, "emg.channels") == 0) {
+            mhi_run_write_channels(run, out);
+            continue;
+        }
         mhi_text_add(out, "%s:\n", s->name);
         if (s->iface == NULL) {
             mhi_options_write(s->options, s->n_options, part, 2, out);

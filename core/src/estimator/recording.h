@@ -5,6 +5,7 @@
 #define MHI_RECORDING_H
 
 #include "config/run.h"
+#include "emg/electrodes.h"
 
 #include <mhe/description.h>
 #include <mhe/host.h>
@@ -26,6 +27,8 @@ typedef struct mhi_recording {
     double unit;     /* metres per unit of the marker file */
     char unit_name[8];
     int32_t n_markers_found, n_emg_found;
+    mhi_emg_report emg_report;
+    char alignment[512]; /* rates and offsets of the sources in a line, where EMG was processed */
     mhi_reference reference;
 } mhi_recording;
 

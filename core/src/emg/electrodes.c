@@ -1,0 +1,396 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "emg/electrodes.h"
+
+#include "base/text.h"
+#include "emg/envelope.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define SAME_TIME 5e-7 /* s: files print times with six digits */
+#define KEPT 1.0       /* s of samples that stay at hand */
+#define STALE 0.01     /* s that a value lives beyond the next sample's turn */
+
+typedef struct wire { /* from a channel to a muscle */
+    int32_t channel, muscle;
+    double factor;
+} wire;
+
+struct mhi_electrodes {
+    int32_t n_channels, n_muscles, n_wires, capacity;
+    int32_t *column; /* [n_channels] of the raw sample */
+    wire *wires;
+    mhi_envelope *envelope;
+    double rate, offset, max;
+    double shift, lag;           /* s */
+    double *raw, *scale, *peaks; /* [n_channels]; peaks of scaled values, before the cut */
+    double *times, *values;      /* rings [capacity], [capacity x n_channels] */
+    int64_t n_pushed;
+    mhi_arena arena;
+};
+
+/* ---- names ---- */
+
+static const char **muscle_names(const mhe_description *d, mhi_arena *arena) {
+    const char **names = MHI_TAKE(arena, const char *, d->n_muscles + 1);
+    for (int32_t i = 0; i < d->n_muscles && names != NULL; i++) {
+        names[i] = d->muscles[i].name;
+    }
+    return names;
+}
+
+static int32_t find_name(const char *const *names, int32_t n, const char *name) {
+    for (int32_t i = 0; i < n; i++) {
+        if (strcmp(names[i], name) == 0) {
+            return i;
+        }
+    }
+    return -1;
+}
+
+/* Columns of the channels among labels. */
+static mhe_status find_columns(const mhi_run *run, const char *source, const char *const *labels,
+                               int32_t n_labels, int32_t *column, mhe_error *err) {
+    union {
+        const char *const *lent;
+        char **owned;
+    } texts = {.lent = labels}; /* only read */
+    const mhi_table table = {.n_labels = n_labels, .labels = texts.owned};
+    for (int32_t i = 0; i < run->emg.n_channels; i++) {
+        const char *name = run->emg.channels[i].name;
+        column[i] = mhi_table_find(&table, name);
+        if (column[i] < 0) {
+            char hint[256];
+            return mhe_fail(err, MHE_E_INPUT, "%s: no column for the channel '%s'%s", source, name,
+                            mhi_suggest(hint, sizeof hint, name, labels, n_labels));
+        }
+    }
+    return MHE_OK;
+}
+
+static mhe_status lay_wires(mhi_electrodes *e, const mhi_run *run, const mhe_description *d,
+                            mhe_error *err) {
+    const mhi_emg_section *o = &run->emg;
+    int32_t n = 0;
+    for (int32_t i = 0; i < o->n_channels; i++) {
+        n += o->channels[i].muscles.n;
+    }
+    const char **names = muscle_names(d, &e->arena);
+    const char **owner = MHI_TAKE(&e->arena, const char *, d->n_muscles + 1);
+    e->wires = MHI_TAKE(&e->arena, wire, n);
+    if (names == NULL || owner == NULL || e->wires == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < o->n_channels; i++) {
+        const mhi_emg_channel *c = &o->channels[i];
+        for (int32_t k = 0; k < c->muscles.n; k++) {
+            const char *name = c->muscles.values[k];
+            const int32_t muscle = find_name(names, d->n_muscles, name);
+            char hint[256];
+            if (muscle < 0) {
+                return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
+                                   "emg.channels: '%s': the model has no muscle '%s'%s", c->name,
+                                   name, mhi_suggest(hint, sizeof hint, name, names, d->n_muscles));
+            }
+            if (owner[muscle] != NULL) {
+                return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
+                                   "emg.channels: the muscle '%s' stands at two channels, '%s' and "
+                                   "'%s'",
+                                   name, owner[muscle], c->name);
+            }
+            owner[muscle] = c->name;
+            e->wires[e->n_wires++] = (wire){i, muscle, c->gains.n > 0 ? c->gains.values[k] : 1};
+        }
+    }
+    return MHE_OK;
+}
+
+/* ---- the stream ---- */
+
+static mhe_status take_arrays(mhi_electrodes *e, mhe_error *err) {
+    const double kept = (e->shift + KEPT) * e->rate + 16;
+    if (!(kept < 1e8)) {
+        return mhe_fail(err, MHE_E_INPUT, "EMG at %g Hz: that cannot be", e->rate);
+    }
+    e->capacity = (int32_t)kept;
+    const int32_t n = e->n_channels;
+    e->raw = MHI_TAKE(&e->arena, double, n);
+    e->scale = MHI_TAKE(&e->arena, double, n);
+    e->peaks = MHI_TAKE(&e->arena, double, n);
+    e->times = MHI_TAKE(&e->arena, double, e->capacity);
+    e->values = MHI_TAKE(&e->arena, double, (int64_t)e->capacity *n);
+    const int missing = e->raw == NULL || e->scale == NULL || e->peaks == NULL ||
+                        e->times == NULL || e->values == NULL;
+    return missing ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+}
+
+mhe_status mhi_electrodes_open(const mhi_run *run, const mhe_description *model, const char *source,
+                               const char *const *labels, int32_t n_labels, double rate,
+                               const double *mvc, mhi_electrodes **electrodes, mhe_error *err) {
+    *electrodes = NULL;
+    mhi_electrodes *e = calloc(1, sizeof *e);
+    if (e == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    const mhi_emg_section *o = &run->emg;
+    e->n_channels = o->n_channels;
+    e->n_muscles = model->n_muscles;
+    e->rate = rate;
+    e->offset = run->data.emg_offset;
+    e->max = o->max;
+    e->column = MHI_TAKE(&e->arena, int32_t, e->n_channels);
+    mhe_error why = {0};
+    mhe_status status = e->column == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                          : lay_wires(e, run, model, err);
+    if (status == MHE_OK) {
+        status = find_columns(run, source, labels, n_labels, e->column, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_envelope_create(o, e->n_channels, rate, &e->envelope, &why);
+        if (status != MHE_OK) {
+            const int in_ms = 500 * rate > o->band_high && rate < 50;
+            (void)mhe_fail(err, status, "%s: %s%s", source, why.text,
+                           in_ms ? " (are its times in ms instead of s?)" : "");
+        }
+    }
+    if (status == MHE_OK) {
+        const double delay = mhi_envelope_delay(e->envelope);
+        e->shift = fmax(0, o->delay - delay);
+        e->lag = fmax(0, delay - o->delay);
+        status = take_arrays(e, err);
+    }
+    if (status != MHE_OK) {
+        mhi_electrodes_close(e);
+        return status;
+    }
+    for (int32_t i = 0; i < e->n_channels; i++) {
+        e->scale[i] = o->channels[i].gain / mvc[i];
+        e->peaks[i] = NAN;
+    }
+    *electrodes = e;
+    return MHE_OK;
+}
+
+void mhi_electrodes_close(mhi_electrodes *e) {
+    if (e != NULL) {
+        mhi_envelope_free(e->envelope);
+        mhi_arena_free(&e->arena);
+        free(e);
+    }
+}
+
+double mhi_electrodes_filter_delay(const mhi_electrodes *e) {
+    return mhi_envelope_delay(e->envelope);
+}
+
+double mhi_electrodes_lag(const mhi_electrodes *e) {
+    return e->lag;
+}
+
+void mhi_electrodes_push(mhi_electrodes *e, double time, const double *raw) {
+    time += e->offset;
+    if (e->n_pushed > 0) {
+        const double since = time - e->times[(e->n_pushed - 1) % e->capacity];
+        if (!(since > 0)) {
+            return;
+        }
+        const double steps = fmin(since * e->rate + 0.5, 1e9);
+        if (steps >= 2) { /* rows are missing */
+            mhi_envelope_skip(e->envelope, (int32_t)steps - 1);
+        }
+    }
+    const int32_t slot = (int32_t)(e->n_pushed++ % e->capacity);
+    double *out = e->values + (ptrdiff_t)slot * e->n_channels;
+    e->times[slot] = time;
+    for (int32_t i = 0; i < e->n_channels; i++) {
+        e->raw[i] = raw[e->column[i]];
+    }
+    mhi_envelope_step(e->envelope, e->raw, out);
+    for (int32_t i = 0; i < e->n_channels; i++) {
+        out[i] *= e->scale[i];
+        e->peaks[i] = fmax(e->peaks[i], out[i]); /* of a number and NaN: the number */
+    }
+}
+
+/* Slot of the newest sample at or before a time; -1: none that is fresh enough. */
+static int32_t newest_before(const mhi_electrodes *e, double time) {
+    const int64_t kept = e->n_pushed < e->capacity ? e->n_pushed : e->capacity;
+    int64_t low = e->n_pushed - kept - 1, high = e->n_pushed;
+    const int64_t none = low;
+    while (high - low > 1) {
+        const int64_t middle = low + (high - low) / 2;
+        if (e->times[middle % e->capacity] <= time + SAME_TIME) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    const int32_t slot = low == none ? -1 : (int32_t)(low % e->capacity);
+    return slot >= 0 && time - e->times[slot] > 1.5 / e->rate + STALE ? -1 : slot;
+}
+
+void mhi_electrodes_at(const mhi_electrodes *e, double time, double *emg) {
+    const int32_t slot = newest_before(e, time - e->shift);
+    for (int32_t i = 0; i < e->n_muscles; i++) {
+        emg[i] = NAN;
+    }
+    for (int32_t i = 0; i < e->n_wires && slot >= 0; i++) {
+        const wire *w = &e->wires[i];
+        const double value = e->values[(ptrdiff_t)slot * e->n_channels + w->channel] * w->factor;
+        emg[w->muscle] = isnan(value) ? NAN : fmin(fmax(value, 0), e->max);
+    }
+}
+
+/* ---- recordings ---- */
+
+/* Columns of the channels replaced by their envelopes, where these look ahead. */
+static mhe_status smooth_whole(const mhi_run *run, mhi_table *table, const int32_t *column,
+                               mhe_error *err) {
+    double *signal = malloc(sizeof(double) * ((size_t)table->n_rows + 1));
+    mhe_status status = signal == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    for (int32_t i = 0; i < run->emg.n_channels && status == MHE_OK; i++) {
+        double *values = table->values + column[i];
+        mhe_error why = {0};
+        for (int32_t k = 0; k < table->n_rows; k++) {
+            signal[k] = values[(ptrdiff_t)k * table->n_columns];
+        }
+        status = mhi_envelope_zero_phase(&run->emg, table->rate, signal, table->n_rows, &why);
+        if (status != MHE_OK) {
+            (void)mhe_fail(err, status, "%s: %s", table->path, why.text);
+        }
+        for (int32_t k = 0; k < table->n_rows; k++) {
+            values[(ptrdiff_t)k * table->n_columns] = signal[k];
+        }
+    }
+    free(signal);
+    return status;
+}
+
+/* Opens electrodes on a table; a run that looks ahead gets its envelopes here. */
+static mhe_status open_on(const mhi_run *run, const mhe_description *model, mhi_table *table,
+                          const double *mvc, mhi_electrodes **e, mhe_error *err) {
+    const char *const *labels = (const char *const *)table->labels;
+    mhe_status status = mhi_electrodes_open(run, model, table->path, labels, table->n_labels,
+                                            table->rate, mvc, e, err);
+    if (status != MHE_OK || !run->emg.process || !run->emg.zero_phase) {
+        return status;
+    }
+    status = smooth_whole(run, table, (*e)->column, err);
+    mhi_electrodes_close(*e);
+    *e = NULL;
+    mhi_run ready = *run;
+    ready.emg.process = 0;
+    return status == MHE_OK ? mhi_electrodes_open(&ready, model, table->path, labels,
+                                                  table->n_labels, table->rate, mvc, e, err)
+                            : status;
+}
+
+/* Largest envelope of each channel in the file of maximal contractions, or its only row. */
+static mhe_status read_mvc_file(const mhi_run *run, const mhe_description *model, double *mvc,
+                                mhe_error *err) {
+    mhi_run plain = *run;
+    mhi_emg_channel *channels = malloc(sizeof *channels * (size_t)run->emg.n_channels);
+    double *ones = malloc(sizeof(double) * (size_t)run->emg.n_channels);
+    mhi_table *table = NULL;
+    mhi_electrodes *e = NULL;
+    mhe_status status = channels == NULL || ones == NULL
+                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                            : mhi_sto_read(run->emg.mvc_file, &table, err);
+    if (status == MHE_OK) {
+        for (int32_t i = 0; i < run->emg.n_channels; i++) {
+            channels[i] = run->emg.channels[i];
+            channels[i].gain = ones[i] = 1;
+        }
+        plain.emg.channels = channels;
+        plain.emg.process = run->emg.process && table->n_rows > 1;
+        table->rate = table->n_rows > 1 ? table->rate : 1;
+        status = open_on(&plain, model, table, ones, &e, err);
+    }
+    for (int32_t k = 0; k < (status == MHE_OK ? table->n_rows : 0); k++) {
+        mhi_electrodes_push(e, table->time[k], table->values + (ptrdiff_t)k * table->n_columns);
+    }
+    for (int32_t i = 0; i < run->emg.n_channels && status == MHE_OK; i++) {
+        if (run->emg.channels[i].mvc > 0) {
+            continue;
+        }
+        mvc[i] = e->peaks[i];
+        if (!(mvc[i] > 0)) {
+            status = mhe_fail(err, MHE_E_INPUT, "%s: channel '%s' shows no contraction",
+                              run->emg.mvc_file, run->emg.channels[i].name);
+        }
+    }
+    mhi_electrodes_close(e);
+    mhi_table_free(table);
+    free(channels);
+    free(ones);
+    return status;
+}
+
+static mhe_status find_mvc(const mhi_run *run, const mhe_description *model, double *mvc,
+                           mhe_error *err) {
+    int32_t open = 0;
+    for (int32_t i = 0; i < run->emg.n_channels; i++) {
+        const double given = run->emg.channels[i].mvc;
+        mvc[i] = given > 0 ? given : 1;
+        open += given <= 0;
+    }
+    return open > 0 && run->emg.mvc_file != NULL ? read_mvc_file(run, model, mvc, err) : MHE_OK;
+}
+
+static mhe_status check_overlap(const mhi_table *table, double offset, const double *time,
+                                int32_t n_frames, mhe_error *err) {
+    const double first = table->time[0] + offset, last = table->time[table->n_rows - 1] + offset;
+    if (n_frames == 0 || (first <= time[n_frames - 1] && last >= time[0])) {
+        return MHE_OK;
+    }
+    return mhe_fail(err, MHE_E_INPUT,
+                    "%s: the EMG, %g to %g s, and the frames, %g to %g s, have no time in common "
+                    "(data.emg_offset moves the EMG)",
+                    table->path, first, last, time[0], time[n_frames - 1]);
+}
+
+mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
+                               const double *time, int32_t n_frames, double *emg,
+                               int32_t *n_muscles_found, mhi_emg_report *report,
+                               const mhe_host *host, mhe_error *err) {
+    mhi_electrodes *e = NULL;
+    double *mvc = calloc((size_t)run->emg.n_channels + 1, sizeof *mvc);
+    mhe_status status = mvc == NULL
+                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                            : check_overlap(table, run->data.emg_offset, time, n_frames, err);
+    if (status == MHE_OK) {
+        status = find_mvc(run, model, mvc, err);
+    }
+    if (status == MHE_OK) {
+        int32_t *column = calloc((size_t)run->emg.n_channels + 1, sizeof *column);
+        status = column == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                : find_columns(run, table->path, (const char *const *)table->labels,
+                                               table->n_labels, column, err);
+        if (status == MHE_OK) {
+            mhi_electrodes_check_raw(run, table, column, host);
+        }
+        free(column);
+    }
+    if (status == MHE_OK) {
+        status = open_on(run, model, table, mvc, &e, err);
+    }
+    if (status == MHE_OK) {
+        int32_t next = 0;
+        for (int32_t k = 0; k < n_frames; k++) {
+            for (; next < table->n_rows && table->time[next] + e->offset <= time[k] + SAME_TIME;
+                 next++) {
+                mhi_electrodes_push(e, table->time[next],
+                                    table->values + (ptrdiff_t)next * table->n_columns);
+            }
+            mhi_electrodes_at(e, time[k], emg + (ptrdiff_t)k * e->n_muscles);
+        }
+        *n_muscles_found = e->n_wires;
+        *report = (mhi_emg_report){e->n_channels, table->rate, e->offset,
+                                   mhi_envelope_delay(e->envelope), e->lag};
+        status = mhi_electrodes_check_peaks(run, table->path, e->peaks, host, err);
+    }
+    mhi_electrodes_close(e);
+    free(mvc);
+    return status;
+}

@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* electrodes.h: raw EMG of electrodes becomes normalised EMG of muscles at the times of frames.
+ *
+ * A recording and a live stream take the same way with the same result, to the bit:
+ *
+ *     mhi_electrodes_open(run, model, labels, n, rate, mvc, &e, &err);
+ *     for each sample:  mhi_electrodes_push(e, time, raw);
+ *     for each frame:   mhi_electrodes_at(e, frame_time, emg);
+ *
+ * A muscle's value is the newest envelope at or before the frame's time, less what the
+ * electromechanical delay is longer than the filters' own, times gain / MVC, cut to 0..max. The
+ * part of the filters' delay beyond the electromechanical delay is the lag: the EMG is that late.
+ *
+ * Threads: electrodes belong to one thread at a time. */
+#ifndef MHI_EMG_ELECTRODES_H
+#define MHI_EMG_ELECTRODES_H
+
+#include "config/run.h"
+#include "io/table.h"
+
+#include <mhe/description.h>
+#include <mhe/host.h>
+
+typedef struct mhi_electrodes mhi_electrodes;
+
+/* For the channels of run->emg among columns `labels` [n_labels], sampled at `rate` (Hz); times
+ * pushed get data.emg_offset added. `mvc` [channels] is the envelope at maximal contraction.
+ * `source` names the columns' file in messages. MHE_E_INPUT: a channel is no column;
+ * MHE_E_CONFIG: a muscle is none of the model's or stands at two channels. [cold] */
+mhe_status mhi_electrodes_open(const mhi_run *run, const mhe_description *model, const char *source,
+                               const char *const *labels, int32_t n_labels, double rate,
+                               const double *mvc, mhi_electrodes **electrodes, mhe_error *err);
+void mhi_electrodes_close(mhi_electrodes *electrodes);
+
+/* The next sample, raw [n_labels], NaN where missing. Times that do not increase are passed over.
+ * [hot] */
+void mhi_electrodes_push(mhi_electrodes *electrodes, double time, const double *raw);
+/* Normalised EMG [n_muscles] at a time; NaN: no electrode, or nothing measured. Samples of the last
+ * second are kept. [hot] */
+void mhi_electrodes_at(const mhi_electrodes *electrodes, double time, double *emg);
+/* Delay of the filters, and the part of it beyond the electromechanical delay, s. [any] */
+double mhi_electrodes_filter_delay(const mhi_electrodes *electrodes);
+double mhi_electrodes_lag(const mhi_electrodes *electrodes);
+
+/* What became of a recording. */
+typedef struct mhi_emg_report {
+    int32_t n_channels;               /* 0: the columns are muscles; the rest is 0 then */
+    double rate;                      /* Hz */
+    double offset, filter_delay, lag; /* s */
+} mhi_emg_report;
+
+/* The file data.emg on frames at time [n_frames]: emg [n_frames x n_muscles]. `table` is changed.
+ * What looks wrong in the data is told to the host, or refused where it cannot be right.
+ * MHE_E_INPUT, MHE_E_CONFIG. [cold] */
+mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
+                               const double *time, int32_t n_frames, double *emg,
+                               int32_t *n_muscles_found, mhi_emg_report *report,
+                               const mhe_host *host, mhe_error *err);
+
+/* electrodes_check.c: warnings about what a raw channel should not look like (flat, at its rail,
+ * missing), and about the size of the normalised peaks [channels]; MHE_E_INPUT: no scale is like
+ * that. `column` [channels]. */
+void mhi_electrodes_check_raw(const mhi_run *run, const mhi_table *table, const int32_t *column,
+                              const mhe_host *host);
+mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, const double *peaks,
+                                      const mhe_host *host, mhe_error *err);
+
+#endif
