@@ -113,7 +113,7 @@ static mhe_status call_step(void *data, void *context, void *scratch, const doub
                             double *const *out, mhe_error *err) {
     const integrator_case *c = data;
     (void)scratch;
-    return c->ops->step(context, in[0], in[1], c->dt, out[0], out[1], out[2], err);
+    return c->ops->step(context, in[0], in[1], c->dt, NULL, out[0], out[1], out[2], err);
 }
 
 /* Largest error of n steps of dt / n against the reference. */
@@ -124,7 +124,7 @@ static double flow_error(const integrator_case *c, void *context, const double *
     for (int i = 0; i < n; i++) {
         double from[MAX_X];
         memcpy(from, next, sizeof from);
-        if (c->ops->step(context, from, u, c->dt / n, next, NULL, NULL, NULL) != MHE_OK) {
+        if (c->ops->step(context, from, u, c->dt / n, NULL, next, NULL, NULL, NULL) != MHE_OK) {
             return NAN;
         }
     }
@@ -153,11 +153,11 @@ static void check_statuses(mhi_kit *kit, integrator_case *c, void *context, cons
     pendulum *p = c->system.data;
     double next[MAX_X];
     p->refuse = MHE_RETRY;
-    const mhe_status retry = c->ops->step(context, x, u, c->dt, next, NULL, NULL, NULL);
+    const mhe_status retry = c->ops->step(context, x, u, c->dt, NULL, next, NULL, NULL, NULL);
     p->refuse = MHE_E_NUMERIC;
-    const mhe_status failure = c->ops->step(context, x, u, c->dt, next, NULL, NULL, NULL);
+    const mhe_status failure = c->ops->step(context, x, u, c->dt, NULL, next, NULL, NULL, NULL);
     p->refuse = MHE_OK;
-    const mhe_status after = c->ops->step(context, x, u, c->dt, next, NULL, NULL, NULL);
+    const mhe_status after = c->ops->step(context, x, u, c->dt, NULL, next, NULL, NULL, NULL);
     if (retry > 0 && failure < 0 && after == MHE_OK) {
         mhi_kit_pass(kit, "the system's statuses are handed on");
     } else {
@@ -165,6 +165,56 @@ static void check_statuses(mhi_kit *kit, integrator_case *c, void *context, cons
                      "retry gave %d, failure %d, a good step after them %d", (int)retry,
                      (int)failure, (int)after);
     }
+}
+
+/* Steps along a line of starts, with a memory and without: the same results, nothing written behind
+ * the memory, and a call that fails leaves it fit for use. */
+static void check_memory(mhi_kit *kit, integrator_case *c, void *context, int32_t size) {
+    const int32_t n_x = c->system.n_x, n_u = c->system.n_u;
+    double *memory = MHI_TAKE(&kit->arena, double, size + 1), worst = 0, worst_d = 0;
+    pendulum *p = c->system.data;
+    mhe_status status = MHE_OK;
+    if (memory == NULL) {
+        mhi_kit_fail(kit, "memory", "out of memory (%s)", c->title);
+        return;
+    }
+    memory[size] = 12345;
+    for (int k = 0; k < 12 && status == MHE_OK; k++) {
+        const double move = k < 6 ? 0.1 * k : 0.6 + 1e-3 * k;
+        const double x[MAX_X] = {0.4 + move, -1.3 - move, 0.25 + 0.2 * move};
+        const double u[MAX_U] = {0.7 - move, -1.1 + move};
+        double next[2][MAX_X], A[2][MAX_X * MAX_X], B[2][MAX_X * MAX_U];
+        double *const d[2][2] = {{A[0], B[0]}, {A[1], B[1]}};
+        const int linear = k % 3 != 1; /* values alone between them */
+        p->refuse = k == 4 ? MHE_RETRY : MHE_OK;
+        for (int i = 0; i < 2 && status == MHE_OK; i++) {
+            status = c->ops->step(context, x, u, c->dt, i == 0 ? NULL : memory, next[i],
+                                  linear ? d[i][0] : NULL, linear ? d[i][1] : NULL, NULL);
+            status = p->refuse == MHE_OK || status <= 0 ? status : MHE_OK;
+        }
+        if (p->refuse != MHE_OK) {
+            p->refuse = MHE_OK;
+            continue;
+        }
+        for (int32_t i = 0; i < n_x; i++) {
+            worst = fmax(worst, fabs(next[0][i] - next[1][i]));
+        }
+        for (int32_t i = 0; linear && i < n_x * n_x; i++) {
+            worst_d = fmax(worst_d, fabs(A[0][i] - A[1][i]));
+        }
+        for (int32_t i = 0; linear && i < n_x * n_u; i++) {
+            worst_d = fmax(worst_d, fabs(B[0][i] - B[1][i]));
+        }
+    }
+    if (status != MHE_OK || memory[size] != 12345) {
+        mhi_kit_fail(kit, "memory", "status %d, %s written behind it (%s)", (int)status,
+                     memory[size] == 12345 ? "nothing" : "something", c->title);
+    }
+    (void)mhi_kit_limit(kit, mhi_arena_format(&kit->arena, "values with a memory (%s)", c->title),
+                        worst, 1e-8);
+    (void)mhi_kit_limit(kit,
+                        mhi_arena_format(&kit->arena, "derivatives with a memory (%s)", c->title),
+                        worst_d, 1e-5);
 }
 
 static void check_steps(mhi_kit *kit, integrator_case *c, void *const *contexts) {
@@ -182,7 +232,7 @@ static void check_steps(mhi_kit *kit, integrator_case *c, void *const *contexts)
     memcpy(probe.worker, contexts, sizeof probe.worker);
     mhi_probe_check(kit, &probe, in);
     mhe_error err = {0};
-    const mhe_status status = c->ops->step(contexts[0], x, u, c->dt, next, A, B, &err);
+    const mhe_status status = c->ops->step(contexts[0], x, u, c->dt, NULL, next, A, B, &err);
     if (status != MHE_OK) {
         mhi_kit_fail(kit, "step", "status %d (%s): %s", (int)status, c->title, err.text);
         return;
@@ -209,8 +259,12 @@ static void check_system(mhi_kit *kit, const char *title, int32_t n_a, int32_t n
         status = c.ops->context_create(self, NULL, &contexts[n], &err);
         n += status == MHE_OK;
     }
+    const int32_t size = c.ops->memory_size != NULL ? c.ops->memory_size(self) : 0;
     if (status == MHE_OK) {
         check_steps(kit, &c, contexts);
+        if (size > 0) {
+            check_memory(kit, &c, contexts[0], size);
+        }
     } else {
         mhi_kit_fail(kit, "contexts", "status %d (%s): %s", (int)status, title, err.text);
     }

@@ -6,8 +6,12 @@
  * the middle stage (a hundredth to a thousandth of the error is left by each); where they are slow
  * the Jacobian is taken anew at all stages, and where that fails too rk_step halves the step. If
  * derivatives are wanted, a last evaluation with derivatives at the converged stages serves both a
- * last full Newton correction and the implicit function theorem. */
-#include "lapack.h"
+ * last full Newton correction and the implicit function theorem.
+ *
+ * With a memory the start is the step as it was linearised last, moved to first order by what its
+ * data have changed: one solve. With derivatives wanted, full Newton iterations follow (between
+ * neighbouring iterates of an estimator one, seldom two), else simplified ones on the factors that
+ * are there. */
 #include "rk.h"
 
 #include <math.h>
@@ -46,10 +50,10 @@ static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, i
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r;
     mhe_acceleration out = {.size = sizeof out, .vdot = c->f + j * n_q};
     if (derivatives) {
-        out.vdot_q = c->f_q + j * n_q * n_q;
-        out.vdot_v = c->f_v + j * n_q * n_q;
-        out.vdot_a = c->f_a + j * n_q * n_m;
-        out.vdot_r = n_r > 0 ? c->f_r + j * n_q * n_r : NULL;
+        out.vdot_q = c->at->f_q + j * n_q * n_q;
+        out.vdot_v = c->at->f_v + j * n_q * n_q;
+        out.vdot_a = c->at->f_a + j * n_q * n_m;
+        out.vdot_r = n_r > 0 ? c->at->f_r + j * n_q * n_r : NULL;
     }
     rk_stage(c, h, j);
     return system->acceleration(system, c->system_context, c->stage_q, c->stage_v,
@@ -72,17 +76,17 @@ static mhe_status rk_evaluate_all(struct rk_context *c, const double *r, double 
 }
 
 /* LU of I - h^2 (A A) f_q - h A f_v; `only` is the stage whose derivatives serve all, -1: each its
- * own. Row-major: to LAPACK it is the transpose. */
+ * own. */
 static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
-    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, info = 0;
+    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q;
     for (int32_t j = 0; j < s; j++) {
         int32_t from = (only < 0 ? j : only) * n_q * n_q;
-        const double *f_q = c->f_q + from, *f_v = c->f_v + from;
+        const double *f_q = c->at->f_q + from, *f_v = c->at->f_v + from;
         for (int32_t k = 0; k < s; k++) {
             double by_q = h * h * t->AA[j * s + k], by_v = h * t->A[j * s + k];
             for (int32_t i = 0; i < n_q; i++) {
-                double *row = c->jacobian + (j * n_q + i) * n + k * n_q;
+                double *row = c->at->lu + (j * n_q + i) * n + k * n_q;
                 for (int32_t m = 0; m < n_q; m++) {
                     row[m] = -by_q * f_q[i * n_q + m] - by_v * f_v[i * n_q + m];
                 }
@@ -90,16 +94,16 @@ static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_er
             }
         }
     }
-    dgetrf_(&n, &n, c->jacobian, &n, c->pivots, &info);
-    return info == 0 ? MHE_OK
-                     : mhe_fail(err, MHE_RETRY, "a stage system over %g s has no solution", h);
+    return rk_lu_factor(c->at->lu, n, c->at->pivots)
+               ? MHE_OK
+               : mhe_fail(err, MHE_RETRY, "a stage system over %g s has no solution", h);
 }
 
 /* Adds the solution of J x = residual to K. Returns its size as a velocity, in units of 1 + |v|;
  * NaN where it has none. */
 static double rk_correct(struct rk_context *c, double h) {
-    int32_t n_q = c->rk->system->n_q, n = c->rk->mechanics.stages * n_q, one = 1, info = 0;
-    dgetrs_("T", &n, &one, c->jacobian, &n, c->pivots, c->residual, &n, &info);
+    int32_t n_q = c->rk->system->n_q, n = c->rk->mechanics.stages * n_q;
+    rk_lu_solve(c->at->lu, n, c->at->pivots, c->residual);
     double largest = 0, speed = 0;
     for (int32_t i = 0; i < n; i++) {
         if (!isfinite(c->residual[i])) {
@@ -120,8 +124,11 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
     const struct rk_tableau *t = &c->rk->mechanics;
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q, n_m = system->n_m;
-    const mhe_acceleration out = {
-        .size = sizeof out, .vdot = c->f, .vdot_q = c->f_q, .vdot_v = c->f_v, .vdot_a = c->f_a};
+    const mhe_acceleration out = {.size = sizeof out,
+                                  .vdot = c->f,
+                                  .vdot_q = c->at->f_q,
+                                  .vdot_v = c->at->f_v,
+                                  .vdot_a = c->at->f_a};
     mhe_status status =
         system->acceleration(system, c->system_context, c->q, c->v, c->a_start, r, &out, err);
     if (status == MHE_OK) {
@@ -139,11 +146,11 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
         for (int32_t i = 0; i < n_q; i++) {
             double sum = 0;
             for (int32_t m = 0; m < n_q; m++) {
-                sum += c->f_q[i * n_q + m] * (c->stage_q[m] - c->q[m]) +
-                       c->f_v[i * n_q + m] * (c->stage_v[m] - c->v[m]);
+                sum += c->at->f_q[i * n_q + m] * (c->stage_q[m] - c->q[m]) +
+                       c->at->f_v[i * n_q + m] * (c->stage_v[m] - c->v[m]);
             }
             for (int32_t m = 0; m < n_m; m++) {
-                sum += c->f_a[i * n_m + m] * (a[m] - c->a_start[m]);
+                sum += c->at->f_a[i * n_m + m] * (a[m] - c->a_start[m]);
             }
             c->residual[j * n_q + i] = sum;
         }
@@ -152,11 +159,62 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
     return MHE_OK;
 }
 
+/* Stage accelerations from those of the last step of this length that was linearised here: to first
+ * order in what its data have changed by. 0: nothing is known. */
+static int rk_recall(struct rk_context *c, const double *r, double h) {
+    const struct rk_tableau *t = &c->rk->mechanics;
+    const mhe_system *system = c->rk->system;
+    const struct rk_slot *at = &c->kept;
+    int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n = t->stages * n_q;
+    if (!rk_memory_slot(c, &c->kept) || *at->step != h) {
+        return 0;
+    }
+    for (int32_t k = 0; k < n; k++) {
+        int32_t j = k / n_q;
+        const double *f_q = at->f_q + k * n_q, *f_v = at->f_v + k * n_q;
+        const double *f_a = at->f_a + k * n_m, *f_r = at->f_r + k * n_r;
+        const double *a = c->stage_a + j * n_m, *a_then = at->stage_a + j * n_m;
+        double sum = 0;
+        for (int32_t m = 0; m < n_q; m++) {
+            double dv = c->v[m] - at->v[m];
+            sum += f_q[m] * (c->q[m] - at->q[m] + h * t->c[j] * dv) + f_v[m] * dv;
+        }
+        for (int32_t m = 0; m < n_m; m++) {
+            sum += f_a[m] * (a[m] - a_then[m]);
+        }
+        for (int32_t m = 0; m < n_r; m++) {
+            sum += f_r[m] * (r[m] - at->r[m]);
+        }
+        c->residual[k] = sum;
+    }
+    c->at = &c->kept;
+    memcpy(c->K, at->K, sizeof(double) * (size_t)n);
+    return isfinite(rk_correct(c, h));
+}
+
+/* Keeps the step just linearised. */
+static void rk_keep(const struct rk_context *c, const double *r, double h) {
+    const mhe_system *system = c->rk->system;
+    const struct rk_slot *at = &c->kept;
+    int32_t n_q = system->n_q, s = c->rk->mechanics.stages;
+    memcpy(at->q, c->q, sizeof(double) * (size_t)n_q);
+    memcpy(at->v, c->v, sizeof(double) * (size_t)n_q);
+    for (int32_t i = 0; i < system->n_r; i++) {
+        at->r[i] = r[i];
+    }
+    memcpy(at->stage_a, c->stage_a, sizeof(double) * (size_t)(s * system->n_m));
+    memcpy(at->K, c->K, sizeof(double) * (size_t)(s * n_q));
+    *at->step = h;
+}
+
 /* One iteration, with a new Jacobian or the one in place; `change` is the size of the correction.
  */
 static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, int jacobian,
                              double *change, mhe_error *err) {
     int32_t s = c->rk->mechanics.stages, n = s * c->rk->system->n_q;
+    if (jacobian != RK_JACOBIAN_KEPT && !c->keeps) {
+        c->at = &c->own;
+    }
     mhe_status status = rk_evaluate_all(c, r, h, jacobian, err);
     if (status == MHE_OK && jacobian != RK_JACOBIAN_KEPT) {
         status = rk_factor(c, h, jacobian == RK_JACOBIAN_ALL ? -1 : s / 2, err);
@@ -173,10 +231,9 @@ static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, in
 }
 
 /* Iterates until the error left in the stages is estimated below `goal`. */
-static mhe_status rk_newton(struct rk_context *c, const double *r, double h, double goal,
-                            mhe_error *err) {
+static mhe_status rk_newton(struct rk_context *c, const double *r, double h, int jacobian,
+                            double goal, mhe_error *err) {
     double change = 0, last = 0, shrink = 1;
-    int jacobian = RK_JACOBIAN_MIDDLE; /* nearer to all stages than the start's */
     for (int32_t iteration = 0; iteration < c->rk->config.max_newton; iteration++) {
         mhe_status status = rk_iterate(c, r, h, jacobian, &change, err);
         if (status != MHE_OK) {
@@ -194,21 +251,37 @@ static mhe_status rk_newton(struct rk_context *c, const double *r, double h, dou
                                : mhe_fail(err, MHE_RETRY, "no stages found for a step of %g s", h);
 }
 
-/* Stages of an implicit scheme. */
-static mhe_status rk_implicit(struct rk_context *c, const double *r, double h, int32_t derivatives,
-                              mhe_error *err) {
-    double tolerance = c->rk->config.newton_tolerance, change = INFINITY;
-    mhe_status status = rk_predict(c, r, h, err);
-    if (status == MHE_OK) {
-        status = rk_newton(c, r, h, derivatives ? fmax(tolerance, RK_BEFORE_LAST) : tolerance, err);
-    }
-    for (int32_t i = 0; derivatives && status == MHE_OK && !(change < RK_LAST); i++) {
+/* Full Newton iterations until one is as small as the derivatives that it leaves behind need. */
+static mhe_status rk_linearise(struct rk_context *c, const double *r, double h, mhe_error *err) {
+    double change = INFINITY;
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; status == MHE_OK && !(change < RK_LAST); i++) {
         if (i == RK_LAST_ROUNDS) {
             return mhe_fail(err, MHE_RETRY, "no stages found for a step of %g s", h);
         }
         status = rk_iterate(c, r, h, RK_JACOBIAN_ALL, &change, err);
     }
     return status;
+}
+
+/* Stages of an implicit scheme; from nothing where what is known does not lead there. */
+static mhe_status rk_implicit(struct rk_context *c, const double *r, double h, int32_t derivatives,
+                              mhe_error *err) {
+    double tolerance = c->rk->config.newton_tolerance;
+    if (rk_recall(c, r, h)) {
+        mhe_status status = derivatives ? rk_linearise(c, r, h, err)
+                                        : rk_newton(c, r, h, RK_JACOBIAN_KEPT, tolerance, err);
+        if (status <= MHE_OK) {
+            return status;
+        }
+    }
+    c->at = c->keeps ? &c->kept : &c->own;
+    mhe_status status = rk_predict(c, r, h, err);
+    if (status == MHE_OK) { /* the middle stage is nearer to all than the start is */
+        status = rk_newton(c, r, h, RK_JACOBIAN_MIDDLE,
+                           derivatives ? fmax(tolerance, RK_BEFORE_LAST) : tolerance, err);
+    }
+    return status == MHE_OK && derivatives ? rk_linearise(c, r, h, err) : status;
 }
 
 /* Stages of an explicit scheme; its stage equations are factored too where derivatives are wanted.
@@ -228,12 +301,26 @@ static mhe_status rk_explicit(struct rk_context *c, const double *r, double h, i
 
 mhe_status rk_mechanics(struct rk_context *c, const double *r, double h, int32_t derivatives,
                         mhe_error *err) {
+    c->at = &c->own;
+    c->keeps = 0;
+    if (c->rk->mechanics.is_explicit) {
+        return rk_explicit(c, r, h, derivatives, err);
+    }
+    c->keeps = derivatives && rk_memory_slot(c, &c->kept);
+    mhe_status status = rk_implicit(c, r, h, derivatives, err);
+    if (c->keeps) {
+        if (status == MHE_OK) {
+            rk_keep(c, r, h);
+        } else {
+            *c->kept.step = 0;
+        }
+    }
+    return status;
+}
+
+mhe_status rk_advance(struct rk_context *c, double h, int32_t derivatives, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q;
-    mhe_status status = (t->is_explicit ? rk_explicit : rk_implicit)(c, r, h, derivatives, err);
-    if (status != MHE_OK) {
-        return status;
-    }
     if (derivatives) {
         rk_chain(c, h);
     }
@@ -249,5 +336,6 @@ mhe_status rk_mechanics(struct rk_context *c, const double *r, double h, int32_t
             return mhe_fail(err, MHE_RETRY, "a step of %g s left the finite", h);
         }
     }
+    c->step++;
     return MHE_OK;
 }

@@ -51,6 +51,7 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
     }
     rk->system = system;
     rk->config = *(const struct rk_config *)config;
+    rk->pad = (system->n_m + RK_LANES - 1) / RK_LANES * RK_LANES;
     rk_tableau_gauss(RK_ACTIVATION_STAGES, &rk->activation);
     if (rk->config.scheme == RK_RK4) {
         rk_tableau_rk4(&rk->mechanics);
@@ -62,15 +63,20 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
         rk_destroy(rk);
         return status;
     }
+    rk_memory_layout(rk);
     *self = rk;
     return MHE_OK;
+}
+
+static int32_t rk_memory_size(const void *self) {
+    const struct rk *rk = self;
+    return rk->memory_steps * rk->memory_stride;
 }
 
 static void rk_context_destroy(void *context) {
     struct rk_context *c = context;
     if (c != NULL) {
-        free(c->memory);
-        free(c->pivots);
+        free(c->arrays);
         free(c);
     }
 }
@@ -79,8 +85,10 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                                     mhe_error *err) {
     const struct rk *rk = self;
     const mhe_system *system = rk->system;
-    size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, n_r = (size_t)system->n_r;
-    size_t s = (size_t)rk->mechanics.stages, columns = 2 * n_q + (size_t)system->n_a + n_m + n_r;
+    size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, pad = (size_t)rk->pad;
+    size_t s = (size_t)rk->mechanics.stages;
+    size_t columns = 2 * n_q + (size_t)(system->n_a + system->n_u);
+    double *slot, *trace;
     struct rk_context *c = calloc(1, sizeof *c);
     if (c == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
@@ -88,31 +96,30 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
     const struct {
         double **array;
         size_t n;
-    } arrays[] = {{&c->a, n_m},
-                  {&c->a_a, n_m},
-                  {&c->a_e, n_m},
+    } arrays[] = {{&c->a, pad},
+                  {&c->a_a, pad},
+                  {&c->a_e, pad},
                   {&c->a_start, n_m},
                   {&c->stage_a, s * n_m},
                   {&c->stage_a_a, s * n_m},
                   {&c->stage_a_e, s * n_m},
-                  {&c->slope, RK_ACTIVATION_STAGES * n_m},
-                  {&c->slope_a, RK_ACTIVATION_STAGES * n_m},
-                  {&c->slope_e, RK_ACTIVATION_STAGES * n_m},
-                  {&c->guess, RK_ACTIVATION_STAGES * n_m},
-                  {&c->guess_a, RK_ACTIVATION_STAGES * n_m},
-                  {&c->guess_e, RK_ACTIVATION_STAGES * n_m},
+                  {&c->slope, RK_ACTIVATION_STAGES * pad},
+                  {&c->slope_a, RK_ACTIVATION_STAGES * pad},
+                  {&c->slope_e, RK_ACTIVATION_STAGES * pad},
+                  {&c->guess, RK_ACTIVATION_STAGES * pad},
+                  {&c->guess_a, RK_ACTIVATION_STAGES * pad},
+                  {&c->guess_e, RK_ACTIVATION_STAGES * pad},
                   {&c->q, n_q},
                   {&c->v, n_q},
                   {&c->K, s * n_q},
                   {&c->stage_q, n_q},
                   {&c->stage_v, n_q},
                   {&c->f, s * n_q},
-                  {&c->f_q, s * n_q * n_q},
-                  {&c->f_v, s * n_q * n_q},
-                  {&c->f_a, s * n_q * n_m},
-                  {&c->f_r, s * n_q * n_r},
-                  {&c->jacobian, s * n_q * s * n_q},
                   {&c->residual, s * n_q},
+                  {&slot, (size_t)rk_slot_size(rk)},
+                  {&trace, (size_t)rk_trace_size(rk)},
+                  {&c->weights, RK_WEIGHED * (RK_WEIGHED + 1) / 2 * s * RK_ACTIVATION_STAGES},
+                  {&c->row, n_m},
                   {&c->adjoint, 2 * n_q * s * n_q},
                   {&c->carry, 2 * n_q * 2 * n_q},
                   {&c->sens, 2 * n_q * columns},
@@ -125,17 +132,19 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
     c->rk = rk;
     c->system_context = system_context;
     c->columns = (int32_t)columns;
-    c->memory = calloc(total, sizeof *c->memory);
-    c->pivots = calloc(s * n_q + 1, sizeof *c->pivots);
-    if (c->memory == NULL || c->pivots == NULL) {
+    c->arrays = calloc(total, sizeof *c->arrays);
+    if (c->arrays == NULL) {
         rk_context_destroy(c);
         return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
     }
-    double *next = c->memory;
+    double *next = c->arrays;
     for (size_t i = 0; i < n_arrays; i++) {
         *arrays[i].array = next;
         next += arrays[i].n;
     }
+    rk_slot_at(rk, slot, &c->own);
+    rk_trace_at(rk, trace, &c->trace);
+    rk_activation_weights(c);
     *context = c;
     return MHE_OK;
 }
@@ -164,10 +173,7 @@ static void rk_begin(struct rk_context *c, const double *x, const double *u) {
         }
         rk_fill(c->stage_a_e, s * n_m, 1);
     }
-    memset(c->sens, 0, sizeof(double) * (size_t)(2 * n_q * c->columns));
-    for (int32_t i = 0; i < 2 * n_q; i++) {
-        c->sens[i * c->columns + i] = 1;
-    }
+    c->step = 0;
 }
 
 /* Splits the carried derivatives into A and B. */
@@ -200,13 +206,17 @@ static mhe_status rk_steps(struct rk_context *c, const double *u, int32_t n, dou
         if (status == MHE_OK) {
             status = rk_mechanics(c, r, h, derivatives, err);
         }
+        if (status == MHE_OK) {
+            status = rk_advance(c, h, derivatives, err);
+        }
     }
     return status;
 }
 
 static mhe_status rk_step(void *context, const double *x, const double *u, double dt,
-                          double *x_next, double *A, double *B, mhe_error *err) {
+                          double *memory, double *x_next, double *A, double *B, mhe_error *err) {
     struct rk_context *c = context;
+    c->memory = memory;
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q;
     int32_t n = (int32_t)fmax(1, ceil(dt / c->rk->config.max_step - 1e-9));
@@ -232,4 +242,5 @@ const mhe_integrator_ops rk_ops = {.size = sizeof rk_ops,
                                    .destroy = rk_destroy,
                                    .context_create = rk_context_create,
                                    .context_destroy = rk_context_destroy,
-                                   .step = rk_step};
+                                   .step = rk_step,
+                                   .memory_size = rk_memory_size};

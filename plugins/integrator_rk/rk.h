@@ -14,6 +14,8 @@
 
 #define RK_MAX_STAGES 6
 #define RK_ACTIVATION_STAGES 4
+#define RK_LANES 4   /* muscles that are computed side by side */
+#define RK_WEIGHED 4 /* activation steps in a mechanical one, whose weights are known ahead */
 #define RK_GAUSS 0
 #define RK_RK4 1
 
@@ -45,6 +47,26 @@ struct rk {
     struct rk_config config;
     struct rk_tableau mechanics, activation;
     double activation_step; /* longest step of the activations, s */
+    int32_t pad;            /* n_m in whole lanes */
+    /* memory of an interval: steps, steps of the activations in one of them, doubles of a step */
+    int32_t memory_steps, memory_traces, memory_stride;
+};
+
+/* A mechanical step as it was linearised last, and where the next one near it starts from. */
+struct rk_slot {
+    double *step;                  /* [1] its length; 0: nothing is known */
+    double *q, *v, *r, *stage_a;   /* [n_q], [n_q], [n_r], [s x n_m] its data */
+    double *K;                     /* [s x n_q] the stages it found */
+    double *f_q, *f_v, *f_a, *f_r; /* [s x ...] derivatives at the stages */
+    double *lu;                    /* [s n_q x s n_q] LU of the stage equations */
+    int32_t *pivots;               /* [s n_q] */
+};
+
+/* The same of a step of the activations. */
+struct rk_trace {
+    double *step;                /* [1] its length; 0: nothing is known */
+    double *a, *e;               /* [n_m] its start and control */
+    double *value, *by_a, *by_e; /* [4 x pad] stage values, their derivatives */
 };
 
 /* One thread's memory; s is mechanics.stages. The carried state is (q, v, a); `sens` is its
@@ -52,43 +74,71 @@ struct rk {
 struct rk_context {
     const struct rk *rk;
     void *system_context;
-    double *memory; /* all arrays below */
+    double *arrays; /* all arrays below */
+    double *memory; /* the interval's, NULL: none */
+    int32_t step;   /* number of the mechanical step in it */
 
     /* activations */
-    double *a, *a_a, *a_e;             /* [n_m] value now; its derivatives by start and control */
+    double *a, *a_a, *a_e;             /* [pad] value now; its derivatives by start and control */
     double *a_start;                   /* [n_m] at the start of the mechanical step */
     double *stage_a;                   /* [s x n_m] as the stages of the mechanical step see them */
     double *stage_a_a, *stage_a_e;     /* [s x n_m] */
-    double *slope, *slope_a, *slope_e; /* [4 x n_m] stage slopes of an activation step */
-    double *guess, *guess_a, *guess_e; /* [4 x n_m] stage values of an activation step */
+    double *slope, *slope_a, *slope_e; /* [4 x pad] stage slopes of an activation step */
+    double *guess, *guess_a, *guess_e; /* [4 x pad] stage values of an activation step */
+    double *weights;                   /* [n, k][s x 4] see rk_activation_weights() */
+    struct rk_trace trace;             /* the context's own */
 
     /* mechanics */
-    double *q, *v;                 /* [n_q] */
-    double *K;                     /* [s x n_q] */
-    double *stage_q, *stage_v;     /* [n_q] of the stage in work */
-    double *f;                     /* [s x n_q] */
-    double *f_q, *f_v, *f_a, *f_r; /* [s x ...] derivatives at the stages */
-    double *jacobian;              /* [s n_q x s n_q] of the stage equations, then its LU */
-    int32_t *pivots;               /* [s n_q] */
-    double *residual;              /* [s n_q] */
-    double *adjoint;               /* [2 n_q x s n_q] d(q+, v+)/d(right-hand sides) */
-    double *carry;                 /* [2 n_q x 2 n_q] d(q+, v+)/d(q, v) */
-    double *sens, *sens_next;      /* [2 n_q x columns] */
-    int32_t columns;               /* 2 n_q + n_a + n_m + n_r */
+    double *q, *v;             /* [n_q] */
+    double *K;                 /* [s x n_q] */
+    double *stage_q, *stage_v; /* [n_q] of the stage in work */
+    double *f;                 /* [s x n_q] */
+    double *residual;          /* [s n_q] */
+    struct rk_slot own, kept;  /* linearisations: the context's; the memory's of this step */
+    struct rk_slot *at;        /* the one in use */
+    int32_t keeps;             /* this call may write to `kept` */
+    double *adjoint;           /* [s n_q x 2 n_q] d(q+, v+)/d(right-hand sides), transposed */
+    double *carry;             /* [2 n_q x 2 n_q] d(q+, v+)/d(q, v), transposed */
+    double *row;               /* [n_m] */
+    double *sens, *sens_next;  /* [2 n_q x columns] */
+    int32_t columns;           /* 2 n_q + n_a + n_m + n_r */
 };
 
 /* Stage activations and their derivatives for the mechanical step [0, h]; moves a, a_a, a_e to its
  * end. [hot] */
 mhe_status rk_activations(struct rk_context *c, const double *e, double h, int32_t derivatives,
                           mhe_error *err);
+/* The weights that it needs, once. [cold] */
+void rk_activation_weights(struct rk_context *c);
 
-/* Moves q, v over one step of length h with the stage activations as they are. With `derivatives`
- * also `sens`. [hot] */
+/* Solves the stages of one step of length h with the stage activations as they are; with
+ * `derivatives` also what rk_advance needs of them. [hot] */
 mhe_status rk_mechanics(struct rk_context *c, const double *r, double h, int32_t derivatives,
                         mhe_error *err);
 
+/* Moves q, v, and with `derivatives` also `sens`, over the step just solved. [hot] */
+mhe_status rk_advance(struct rk_context *c, double h, int32_t derivatives, mhe_error *err);
+
 /* Chains the derivatives of the step just solved onto `sens`. [hot] */
 void rk_chain(struct rk_context *c, double h);
+
+/* memory.c: sizes of the memory of an interval, from system, tableaus and config; doubles of a slot
+ * and a trace, and their arrays in a block of so many. */
+void rk_memory_layout(struct rk *rk);
+int32_t rk_slot_size(const struct rk *rk);
+int32_t rk_trace_size(const struct rk *rk);
+void rk_slot_at(const struct rk *rk, double *memory, struct rk_slot *out);
+void rk_trace_at(const struct rk *rk, double *memory, struct rk_trace *out);
+/* The slot of the present step, the trace of its k-th activation step; 0: none is kept. [hot] */
+int rk_memory_slot(const struct rk_context *c, struct rk_slot *out);
+int rk_memory_trace(const struct rk_context *c, int32_t k, struct rk_trace *out);
+
+/* lu.c: a [n x n] row-major becomes its LU factors (0: singular); x [n] = A^-1 x; x [n x m],
+ * row-major, = A^-T x. */
+int rk_lu_factor(double *a, int32_t n, int32_t *pivots);
+void rk_lu_solve(const double *lu, int32_t n, const int32_t *pivots, double *x);
+void rk_lu_solve_transposed(const double *lu, int32_t n, const int32_t *pivots, double *x,
+                            int32_t m);
 
 extern const mhe_integrator_ops rk_ops;
 

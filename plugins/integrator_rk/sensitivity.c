@@ -4,76 +4,75 @@
  * The stage equations K = f(stages) have the Jacobian J (factored). q+ and v+ are linear in K, so
  *     W = [h^2 b A; h b] J^-1   [2 n_q x s n_q]
  * turns any change of a right-hand side f_j into a change of (q+, v+): 2 n_q solves with J^T
- * instead of one a parameter. */
-#include "lapack.h"
+ * instead of one a parameter. All loops run along rows that the compiler vectorises. */
 #include "rk.h"
 
 #include <string.h>
 
-/* W, row-major: its rows are the columns LAPACK solves for. */
+/* to [n] += factor * from [n] */
+static inline void rk_add(double *restrict to, double factor, const double *restrict from,
+                          int32_t n) {
+    for (int32_t i = 0; i < n; i++) {
+        to[i] += factor * from[i];
+    }
+}
+
+/* The transpose of W: row j n_q + k holds what a change of the k-th right-hand side of stage j does
+ * to (q+, v+). */
 static void rk_adjoint(struct rk_context *c, double h) {
     const struct rk_tableau *t = &c->rk->mechanics;
-    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, two = 2 * n_q, info = 0;
-    memset(c->adjoint, 0, sizeof(double) * (size_t)(two * n));
-    for (int32_t i = 0; i < n_q; i++) {
-        for (int32_t j = 0; j < s; j++) {
-            c->adjoint[i * n + j * n_q + i] = h * h * t->bA[j];
-            c->adjoint[(n_q + i) * n + j * n_q + i] = h * t->b[j];
+    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, two = 2 * n_q;
+    memset(c->adjoint, 0, sizeof(double) * (size_t)(n * two));
+    for (int32_t j = 0; j < s; j++) {
+        for (int32_t i = 0; i < n_q; i++) {
+            double *row = c->adjoint + (j * n_q + i) * two;
+            row[i] = h * h * t->bA[j];
+            row[n_q + i] = h * t->b[j];
         }
     }
-    dgetrs_("N", &n, &two, c->jacobian, &n, c->pivots, c->adjoint, &n, &info);
+    rk_lu_solve_transposed(c->at->lu, n, c->at->pivots, c->adjoint, two);
 }
 
-/* carry = d(q+, v+)/d(q, v) of this step. */
+/* The transpose of d(q+, v+)/d(q, v) of this step. */
 static void rk_carry(struct rk_context *c, double h) {
     const struct rk_tableau *t = &c->rk->mechanics;
-    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, two = 2 * n_q;
-    for (int32_t i = 0; i < two; i++) {
-        double *by_q = c->carry + i * two, *by_v = by_q + n_q;
-        memset(by_q, 0, sizeof(double) * (size_t)two);
-        by_q[i] = 1;
-        if (i < n_q) {
-            by_v[i] = h;
-        }
-        for (int32_t j = 0; j < s; j++) {
-            const double *w = c->adjoint + i * n + j * n_q;
-            const double *f_q = c->f_q + j * n_q * n_q, *f_v = c->f_v + j * n_q * n_q;
-            for (int32_t k = 0; k < n_q; k++) {
-                for (int32_t m = 0; m < n_q; m++) {
-                    double wf = w[k] * f_q[k * n_q + m];
-                    by_q[m] += wf;
-                    by_v[m] += h * t->c[j] * wf + w[k] * f_v[k * n_q + m];
-                }
-            }
+    int32_t n_q = c->rk->system->n_q, s = t->stages, two = 2 * n_q;
+    double *by_q = c->carry, *by_v = by_q + n_q * two;
+    memset(c->carry, 0, sizeof(double) * (size_t)(two * two));
+    for (int32_t i = 0; i < n_q; i++) {
+        by_q[i * two + i] = by_v[i * two + n_q + i] = 1;
+        by_v[i * two + i] = h;
+    }
+    for (int32_t k = 0; k < s * n_q; k++) {
+        const double *w = c->adjoint + k * two;
+        double ch = h * t->c[k / n_q];
+        const double *f_q = c->at->f_q + k * n_q, *f_v = c->at->f_v + k * n_q;
+        for (int32_t m = 0; m < n_q; m++) {
+            rk_add(by_q + m * two, f_q[m], w, two);
+            rk_add(by_v + m * two, ch * f_q[m] + f_v[m], w, two);
         }
     }
 }
 
-/* Adds the direct effect of stage activations and residual torques to sens_next. */
-static void rk_direct(struct rk_context *c) {
+/* Adds the direct effect of stage activations and residual torques on (q+, v+)_i to `next`, its row
+ * of sens_next. */
+static void rk_direct(struct rk_context *c, int32_t i, double *next) {
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_a = system->n_a;
-    int32_t s = c->rk->mechanics.stages, n = s * n_q;
-    for (int32_t i = 0; i < 2 * n_q; i++) {
-        double *by_a = c->sens_next + i * c->columns + 2 * n_q;
-        double *by_e = by_a + n_a, *by_r = by_e + n_m;
-        for (int32_t j = 0; j < s; j++) {
-            const double *w = c->adjoint + i * n + j * n_q;
-            for (int32_t m = 0; m < n_m; m++) {
-                double wf = 0;
-                for (int32_t k = 0; k < n_q; k++) {
-                    wf += w[k] * c->f_a[(j * n_q + k) * n_m + m];
-                }
-                if (n_a > 0) {
-                    by_a[m] += wf * c->stage_a_a[j * n_m + m];
-                }
-                by_e[m] += wf * c->stage_a_e[j * n_m + m];
-            }
-            for (int32_t k = 0; k < n_q; k++) {
-                for (int32_t m = 0; m < n_r; m++) {
-                    by_r[m] += w[k] * c->f_r[(j * n_q + k) * n_r + m];
-                }
-            }
+    double *by_a = next + 2 * n_q, *by_e = by_a + n_a, *by_r = by_e + n_m, *row = c->row;
+    for (int32_t j = 0; j < c->rk->mechanics.stages; j++) {
+        const double *stage_a_a = c->stage_a_a + j * n_m, *stage_a_e = c->stage_a_e + j * n_m;
+        memset(row, 0, sizeof(double) * (size_t)n_m);
+        for (int32_t k = j * n_q; k < (j + 1) * n_q; k++) {
+            double w = c->adjoint[k * 2 * n_q + i];
+            rk_add(row, w, c->at->f_a + k * n_m, n_m);
+            rk_add(by_r, w, c->at->f_r + k * n_r, n_r);
+        }
+        for (int32_t m = 0; m < n_a; m++) {
+            by_a[m] += row[m] * stage_a_a[m];
+        }
+        for (int32_t m = 0; m < n_m; m++) {
+            by_e[m] += row[m] * stage_a_e[m];
         }
     }
 }
@@ -86,13 +85,14 @@ void rk_chain(struct rk_context *c, double h) {
         double *next = c->sens_next + i * columns;
         memset(next, 0, sizeof(double) * (size_t)columns);
         for (int32_t k = 0; k < two; k++) {
-            double by = c->carry[i * two + k];
-            for (int32_t m = 0; m < columns; m++) {
-                next[m] += by * c->sens[k * columns + m];
+            if (c->step == 0) { /* sens is the identity */
+                next[k] = c->carry[k * two + i];
+            } else {
+                rk_add(next, c->carry[k * two + i], c->sens + k * columns, columns);
             }
         }
+        rk_direct(c, i, next);
     }
-    rk_direct(c);
     double *swap = c->sens;
     c->sens = c->sens_next;
     c->sens_next = swap;

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define RK "mhe.integrator.rk"
@@ -68,6 +69,52 @@ static void same_step_with_derivatives(void **state) {
     print_message("with and without derivatives: %.1e\n", worst);
     assert_true(worst < 1e-9);
     test_integrator_close(&rk);
+}
+
+/* A memory changes the price, not the result: along a line of starts, in steps of all sizes, with
+ * values and derivatives asked for in turn. */
+static void memory(void **state) {
+    (void)state;
+    uint64_t seed = 12;
+    double worst = 0, worst_derivative = 0;
+    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+        mhe_system system;
+        test_pendulum_system(flags, &system);
+        struct test_integrator rk = test_integrator_open(RK, "stages: 3", &system, NULL);
+        double *kept = calloc((size_t)rk.ops->memory_size(rk.self), sizeof *kept);
+        double x[SYSTEM_X], u[SYSTEM_U];
+        assert_non_null(kept);
+        random_state(&seed, &system, x, u);
+        for (int trial = 0; trial < 200; trial++) {
+            double next[2][SYSTEM_X], A[2][SYSTEM_X * SYSTEM_X], B[2][SYSTEM_X * SYSTEM_U];
+            double move = pow(10, test_random(&seed, -9, -0.5)), dt = trial % 17 < 14 ? 0.03 : 0.02;
+            int linear = trial % 3 > 0;
+            for (int32_t i = 0; i < system.n_x; i++) {
+                x[i] += move * test_random(&seed, -1, 1) * (i < 4 ? 1 : 0.2 * x[i]);
+            }
+            for (int32_t i = 0; i < system.n_u; i++) {
+                u[i] = fmin(1, fmax(0, u[i] + move * test_random(&seed, -1, 1)));
+            }
+            for (int i = 0; i < 2; i++) {
+                assert_int_equal(rk.ops->step(rk.context, x, u, dt, i == 0 ? NULL : kept, next[i],
+                                              linear ? A[i] : NULL, linear ? B[i] : NULL, NULL),
+                                 MHE_OK);
+            }
+            worst = fmax(worst, test_relative(next[1], next[0], system.n_x));
+            if (linear) {
+                worst_derivative =
+                    fmax(worst_derivative, test_relative(A[1], A[0], system.n_x * system.n_x));
+                worst_derivative =
+                    fmax(worst_derivative, test_relative(B[1], B[0], system.n_x * system.n_u));
+            }
+        }
+        free(kept);
+        test_integrator_close(&rk);
+    }
+    print_message("with and without a memory: values %.1e, A and B %.1e\n", worst,
+                  worst_derivative);
+    assert_true(worst < 1e-9);            /* newton_tolerance and what follows from it */
+    assert_true(worst_derivative < 1e-5); /* stages off by at most RK_LAST */
 }
 
 /* Mean error of (q, v) after 80 ms over some random states. */
@@ -262,16 +309,18 @@ static void bad_points(void **state) {
     struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
     double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
     mhe_error err = {0};
-    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, next, NULL, NULL, &err), MHE_RETRY);
+    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, NULL, next, NULL, NULL, &err), MHE_RETRY);
     assert_string_equal(err.text, "outside");
     x[0] = 101;
-    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, next, NULL, NULL, &err), MHE_E_NUMERIC);
+    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+                     MHE_E_NUMERIC);
     const double bad[] = {NAN, INFINITY};
     for (int i = 0; i < SYSTEM_X; i++) {
         for (int k = 0; k < 2; k++) {
             double y[SYSTEM_X] = {0, 0, 0, 0, 0.5, 0.5, 0.5};
             y[i] = bad[k];
-            assert_true(rk.ops->step(rk.context, y, u, 0.03, next, NULL, NULL, &err) != MHE_OK);
+            assert_true(rk.ops->step(rk.context, y, u, 0.03, NULL, next, NULL, NULL, &err) !=
+                        MHE_OK);
         }
     }
     x[0] = 0; /* and it goes on */
@@ -281,9 +330,9 @@ static void bad_points(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(derivatives), cmocka_unit_test(same_step_with_derivatives),
-        cmocka_unit_test(order),       cmocka_unit_test(linear_system),
-        cmocka_unit_test(energy),      cmocka_unit_test(against_cvodes),
-        cmocka_unit_test(bad_points)};
+        cmocka_unit_test(derivatives),    cmocka_unit_test(same_step_with_derivatives),
+        cmocka_unit_test(memory),         cmocka_unit_test(order),
+        cmocka_unit_test(linear_system),  cmocka_unit_test(energy),
+        cmocka_unit_test(against_cvodes), cmocka_unit_test(bad_points)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -175,8 +175,9 @@ static mhe_status flow_failure(const struct flow_context *c, int flag, mhe_error
 }
 
 static mhe_status flow_step(void *context, const double *x, const double *u, double dt,
-                            double *x_next, double *A, double *B, mhe_error *err) {
+                            double *memory, double *x_next, double *A, double *B, mhe_error *err) {
     struct flow_context *c = context;
+    (void)memory;
     int32_t n_x = c->flow->system->n_x, n_u = c->flow->system->n_u;
     sunrealtype reached = 0;
     c->u = u;

@@ -242,13 +242,14 @@ AT(mhe_system, data, 32);
 AT(mhe_system, acceleration, 40);
 AT(mhe_system, activation_rate, 48);
 
-SIZE(mhe_integrator_ops, 48);
+SIZE(mhe_integrator_ops, 56);
 AT(mhe_integrator_ops, size, 0);
 AT(mhe_integrator_ops, create, 8);
 AT(mhe_integrator_ops, destroy, 16);
 AT(mhe_integrator_ops, context_create, 24);
 AT(mhe_integrator_ops, context_destroy, 32);
 AT(mhe_integrator_ops, step, 40);
+AT(mhe_integrator_ops, memory_size, 48);
 
 SIZE(mhe_stage_values, 80);
 AT(mhe_stage_values, size, 0);

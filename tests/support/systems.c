@@ -235,7 +235,7 @@ void test_integrator_close(struct test_integrator *integrator) {
 void test_integrate(const struct test_integrator *integrator, const double *x, const double *u,
                     double dt, double *x_next, double *A, double *B) {
     mhe_error err = {0};
-    if (integrator->ops->step(integrator->context, x, u, dt, x_next, A, B, &err) != MHE_OK) {
+    if (integrator->ops->step(integrator->context, x, u, dt, NULL, x_next, A, B, &err) != MHE_OK) {
         fail_msg("%s", err.text);
     }
 }
@@ -257,7 +257,7 @@ struct step_data {
 static int step_of(void *data, const double *xu, double *y) {
     const struct step_data *d = data;
     const struct test_integrator *i = d->integrator;
-    return i->ops->step(i->context, xu, xu + i->system->n_x, d->dt, y, NULL, NULL, NULL);
+    return i->ops->step(i->context, xu, xu + i->system->n_x, d->dt, NULL, y, NULL, NULL, NULL);
 }
 
 double test_step_derivatives(const struct test_integrator *integrator, const double *x,

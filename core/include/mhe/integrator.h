@@ -63,9 +63,17 @@ typedef struct mhe_integrator_ops {
     void (*context_destroy)(void *context); /* [cold] */
     /* x_next [n_x] after dt > 0 seconds from x [n_x] under u [n_u]. A = dx_next/dx [n_x x n_x] and
      * B = dx_next/du [n_x x n_u], row-major, both or neither NULL. MHE_RETRY: no solution from this
-     * point. [hot] */
-    mhe_status (*step)(void *context, const double *x, const double *u, double dt, double *x_next,
-                       double *A, double *B, mhe_error *err);
+     * point.
+     *
+     * `memory` [memory_size()], NULL allowed: belongs to one interval and one call at a time, and
+     * carries what a call found to the next on this interval or one near it, which then starts
+     * there. All zero: nothing is known. It may change the result within the integrator's tolerance
+     * and nothing else, whatever calls it comes from; a call that fails leaves it fit for use.
+     * [hot] */
+    mhe_status (*step)(void *context, const double *x, const double *u, double dt, double *memory,
+                       double *x_next, double *A, double *B, mhe_error *err);
+    /* Doubles of memory that an interval is worth; the function may be NULL: none. [cold] */
+    int32_t (*memory_size)(const void *self);
 } mhe_integrator_ops;
 
 #ifdef __cplusplus

@@ -44,15 +44,17 @@ struct mhe_stage_problem {
     uint32_t size;
     int32_t n_intervals; /* N >= 1 */
     int32_t n_x, n_u;
-    int32_t n_workers; /* evaluate() may run at the same time for workers 0 .. n_workers-1 */
+    int32_t n_workers; /* evaluate() may run at the same time for workers 0 .. n_workers-1, each of
+                        * them at another node */
     /* Bounds [(N+1) x n_x] and [N x n_u], +-infinity allowed; read anew at every solve. */
     const double *x_lower, *x_upper, *u_lower, *u_upper;
     /* Structure: 1 where an entry can be non-zero at any node. A [n_x x n_x], B [n_x x n_u],
      * Gauss-Newton Hessian [n_x x n_x], [n_u x n_x], [n_u x n_u]; the same at all nodes. */
     const uint8_t *A_pattern, *B_pattern, *xx_pattern, *ux_pattern, *uu_pattern;
     void *data; /* the core's own */
-    /* Values at node k (0..N) for (x [n_x], u [n_u], NULL at N). MHE_RETRY: no value here, shorten
-     * the step. [hot] */
+    /* Values at node k (0..N) for (x [n_x], u [n_u], NULL at N). What was computed at this node
+     * before may move x_next, A, B within the integrator's tolerance. MHE_RETRY: no value here,
+     * shorten the step. [hot] */
     mhe_status (*evaluate)(const mhe_stage_problem *problem, int32_t worker, int32_t k,
                            const double *x, const double *u, const mhe_stage_values *out,
                            mhe_error *err);

@@ -289,4 +289,5 @@ void mhi_window_advance(mhe_estimator *e) {
     shift_rows(s->zu_lower, n, e->n_u);
     shift_rows(s->zu_upper, n, e->n_u);
     shift_rows(s->lambda, n, e->n_x);
+    mhi_ocp_shift(e->ocp);
 }

@@ -121,6 +121,12 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     return MHE_OK;
 }
 
+/* What the integrator keeps of interval k. */
+static double *interval_memory(const mhi_ocp *ocp, int32_t k) {
+    const int32_t place = (ocp->first_memory + k) % ocp->face.n_intervals;
+    return ocp->memory_size == 0 ? NULL : ocp->memory + (ptrdiff_t)place * ocp->memory_size;
+}
+
 mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_index, int32_t k,
                             const double *x, const double *u, const mhe_stage_values *out,
                             mhe_error *err) {
@@ -134,8 +140,8 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
         status = evaluate_cost(ocp, w, k, x, u, out, err);
     }
     if (status == MHE_OK && u != NULL && out->x_next != NULL) {
-        status = ocp->integrator->step(w->integrator, x, u, ocp->interval, out->x_next, out->A,
-                                       out->B, err);
+        status = ocp->integrator->step(w->integrator, x, u, ocp->interval, interval_memory(ocp, k),
+                                       out->x_next, out->A, out->B, err);
     }
     return status;
 }
@@ -198,6 +204,15 @@ void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {
     ocp->problem.interval = interval;
 }
 
+void mhi_ocp_shift(mhi_ocp *ocp) {
+    const int32_t last = ocp->face.n_intervals - 1;
+    ocp->first_memory = (ocp->first_memory + 1) % ocp->face.n_intervals;
+    if (last > 0 && ocp->memory_size > 0) {
+        memcpy(interval_memory(ocp, last), interval_memory(ocp, last - 1),
+               sizeof(double) * (size_t)ocp->memory_size);
+    }
+}
+
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight) {
     memcpy(ocp->prior_centre, centre, sizeof(double) * (size_t)ocp->face.n_x);
     memcpy(ocp->prior_weight, weight, sizeof(double) * (size_t)ocp->face.n_x);
@@ -209,8 +224,8 @@ void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {
 
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
                            mhe_error *err) {
-    return ocp->integrator->step(ocp->workers[0].integrator, x, u, ocp->interval, x_next, NULL,
-                                 NULL, err);
+    return ocp->integrator->step(ocp->workers[0].integrator, x, u, ocp->interval, NULL, x_next,
+                                 NULL, NULL, err);
 }
 
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp) {

@@ -44,6 +44,9 @@ double *mhi_ocp_u_upper(mhi_ocp *ocp, int32_t k);
 /* Target of a signal (MHI_SIGNAL_*) at node k: [n_y of the signal], NaN where none is known (as at
  * the start); NULL where the problem has no such signal. */
 double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
+/* The window moves on by one interval: what the integrator keeps of interval k + 1 becomes that of
+ * k, the last one's that of the new one too. */
+void mhi_ocp_shift(mhi_ocp *ocp);
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval);    /* s, of all intervals */
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time); /* s, told to costs */
 

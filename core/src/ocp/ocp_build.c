@@ -163,6 +163,18 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     return MHE_OK;
 }
 
+/* Needs the integrator's instance. */
+static mhe_status take_memory(mhi_ocp *ocp, mhe_error *err) {
+    if (ocp->integrator->memory_size != NULL) {
+        ocp->memory_size = ocp->integrator->memory_size(ocp->integrator_self);
+        ocp->memory =
+            MHI_TAKE(&ocp->arena, double, (ptrdiff_t)ocp->face.n_intervals * ocp->memory_size);
+    }
+    return ocp->memory_size > 0 && ocp->memory == NULL
+               ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+               : MHE_OK;
+}
+
 /* Term i, whose refusal begins with "costs.<i>: ". */
 static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t i, mhe_error *err) {
     mhe_status status = mhi_term_create(setup->host, &setup->terms[i], &ocp->problem, &ocp->signals,
@@ -194,6 +206,9 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
     if (status == MHE_OK) {
         status = mhi_integrator_create(setup->integrator, setup->host, f, setup->integrator_config,
                                        &ocp->integrator_self, err);
+    }
+    if (status == MHE_OK) {
+        status = take_memory(ocp, err);
     }
     for (int32_t i = 0; i < ocp->face.n_workers && status == MHE_OK; i++) {
         ocp->n_workers_created = i + 1;

@@ -30,6 +30,8 @@ struct mhi_ocp {
     double *targets;                     /* [(N+1) x n_y] */
     double *times;                       /* [N+1] */
     double *prior_centre, *prior_weight; /* [n_x] */
+    double *memory;                      /* [N x memory_size] a ring, see interval_memory() */
+    int32_t memory_size, first_memory;   /* of the integrator, one interval; place of interval 0 */
     mhi_ocp_worker *workers;
     mhi_arena arena;
 };

@@ -86,9 +86,9 @@ static mhe_status integrator_context(const void *self, void *system_context, voi
     return refuse(err);
 }
 
-static mhe_status step(void *context, const double *x, const double *u, double dt, double *x_next,
-                       double *A, double *B, mhe_error *err) {
-    (void)context, (void)x, (void)u, (void)dt, (void)x_next, (void)A, (void)B;
+static mhe_status step(void *context, const double *x, const double *u, double dt, double *memory,
+                       double *x_next, double *A, double *B, mhe_error *err) {
+    (void)context, (void)x, (void)u, (void)dt, (void)memory, (void)x_next, (void)A, (void)B;
     return refuse(err);
 }
 

@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* memory.c: where the memory of an interval keeps its steps.
+ *
+ * Step after step of the interval: a slot of the mechanical step, then the traces of the steps that
+ * its activations take. Steps beyond the capacity start from nothing. */
+#include "rk.h"
+
+#include <math.h>
+
+/* The steps of this many seconds are kept, but never more than so many. */
+#define RK_MEMORY_SPAN 0.06
+#define RK_MEMORY_STEPS 8
+#define RK_MEMORY_TRACES 4
+
+/* Length of an array at *next, which moves behind it. */
+static double *rk_take(double **next, int32_t n) {
+    double *array = *next;
+    *next += n;
+    return array;
+}
+
+int32_t rk_slot_size(const struct rk *rk) {
+    int32_t q = rk->system->n_q, m = rk->system->n_m, r = rk->system->n_r;
+    int32_t s = rk->mechanics.stages, n = s * q;
+    return 1 + 2 * q + r + s * m + n + 2 * n * q + n * m + n * r + n * n + n;
+}
+
+void rk_slot_at(const struct rk *rk, double *memory, struct rk_slot *out) {
+    int32_t q = rk->system->n_q, m = rk->system->n_m, r = rk->system->n_r;
+    int32_t s = rk->mechanics.stages, n = s * q;
+    out->step = rk_take(&memory, 1);
+    out->q = rk_take(&memory, q);
+    out->v = rk_take(&memory, q);
+    out->r = rk_take(&memory, r);
+    out->stage_a = rk_take(&memory, s * m);
+    out->K = rk_take(&memory, n);
+    out->f_q = rk_take(&memory, n * q);
+    out->f_v = rk_take(&memory, n * q);
+    out->f_a = rk_take(&memory, n * m);
+    out->f_r = rk_take(&memory, n * r);
+    out->lu = rk_take(&memory, n * n);
+    out->pivots = (int32_t *)(void *)rk_take(&memory, n);
+}
+
+int32_t rk_trace_size(const struct rk *rk) {
+    return 1 + 2 * rk->system->n_m + 3 * RK_ACTIVATION_STAGES * rk->pad;
+}
+
+void rk_trace_at(const struct rk *rk, double *memory, struct rk_trace *out) {
+    int32_t m = rk->system->n_m, n = RK_ACTIVATION_STAGES * rk->pad;
+    out->step = rk_take(&memory, 1);
+    out->a = rk_take(&memory, m);
+    out->e = rk_take(&memory, m);
+    out->value = rk_take(&memory, n);
+    out->by_a = rk_take(&memory, n);
+    out->by_e = rk_take(&memory, n);
+}
+
+static int32_t rk_at_most(double wanted, int32_t most) {
+    return wanted < most ? (int32_t)wanted : most;
+}
+
+void rk_memory_layout(struct rk *rk) {
+    if (rk->mechanics.is_explicit) {
+        return; /* nothing to start from */
+    }
+    double step = rk->config.max_step;
+    rk->memory_steps = rk_at_most(ceil(RK_MEMORY_SPAN / step - 1e-9), RK_MEMORY_STEPS);
+    rk->memory_traces =
+        rk->system->n_a > 0 ? rk_at_most(ceil(step / rk->activation_step), RK_MEMORY_TRACES) : 0;
+    rk->memory_stride = rk_slot_size(rk) + rk->memory_traces * rk_trace_size(rk);
+}
+
+int rk_memory_slot(const struct rk_context *c, struct rk_slot *out) {
+    if (c->memory == NULL || c->step >= c->rk->memory_steps) {
+        return 0;
+    }
+    rk_slot_at(c->rk, c->memory + c->step * c->rk->memory_stride, out);
+    return 1;
+}
+
+int rk_memory_trace(const struct rk_context *c, int32_t k, struct rk_trace *out) {
+    const struct rk *rk = c->rk;
+    if (c->memory == NULL || c->step >= rk->memory_steps || k >= rk->memory_traces) {
+        return 0;
+    }
+    rk_trace_at(rk,
+                c->memory + c->step * rk->memory_stride + rk_slot_size(rk) + k * rk_trace_size(rk),
+                out);
+    return 1;
+}
