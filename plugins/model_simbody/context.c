@@ -2,7 +2,41 @@
 /* context.c: instances of the model and the memory of their contexts. */
 #include "context.h"
 
+#include <math.h>
 #include <stdlib.h>
+
+#define PLACEMENT 1e-10 /* m, 1: what rounding may make of long chains */
+
+/* The recursion places links where Simbody does: at one posture in which every joint is turned. */
+static mhe_status check_placement(const tree *t, mhe_error *err) {
+    const size_t n = (size_t)t->n_joints;
+    double *angle = calloc(25 * n, sizeof *angle), worst = 0;
+    skeleton *made = NULL;
+    if (angle == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
+    }
+    double *r = angle + n, *p = r + 9 * n, *r_own = p + 3 * n, *p_own = r_own + 9 * n;
+    for (size_t i = 0; i < n; i++) {
+        angle[i] = 0.3 + 0.1 * (double)(i % 7);
+    }
+    mhe_status status = skeleton_create(t, 0, &made, err);
+    if (status == MHE_OK) {
+        status = skeleton_place(made, angle, r, p, err);
+        skeleton_free(made);
+    }
+    if (status == MHE_OK) {
+        dynamics_place(t, angle, r_own, p_own);
+        for (size_t i = 0; i < 12 * n; i++) { /* r and p lie one after the other */
+            worst = fmax(worst, fabs(r[i] - r_own[i]) / (1 + fabs(r[i])));
+        }
+        if (!(worst < PLACEMENT)) {
+            status =
+                mhe_fail(err, MHE_E_INTERNAL, "links are %g off where Simbody places them", worst);
+        }
+    }
+    free(angle);
+    return status;
+}
 
 mhe_status simbody_create(const mhe_host *host, const mhe_description *description,
                           const void *config, void **self, mhe_error *err) {
@@ -14,6 +48,9 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
     }
     model->dynamics = c->dynamics;
     mhe_status status = tree_create(description, &model->tree, err);
+    if (status == MHE_OK) {
+        status = check_placement(model->tree, err);
+    }
     if (status != MHE_OK) {
         simbody_destroy(model);
         return status;
@@ -84,7 +121,9 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
         (void)mhe_fail(err, status, "no memory for a context");
         goto fail;
     }
-    status = skeleton_create(c->tree, c->dynamics == SIMBODY_DYNAMICS_SIMBODY, &c->skeleton, err);
+    if (c->dynamics == SIMBODY_DYNAMICS_SIMBODY) {
+        status = skeleton_create(c->tree, 1, &c->skeleton, err);
+    }
     if (status != MHE_OK) {
         goto fail;
     }

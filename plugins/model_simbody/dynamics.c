@@ -15,6 +15,7 @@
 
 #include "vector.h"
 
+#include <math.h>
 #include <string.h>
 
 static const double no_motion[6];
@@ -40,6 +41,30 @@ static void inertia_add(rigid_inertia *to, const rigid_inertia *from) {
     }
     for (int i = 0; i < 9; i++) {
         to->second[i] += from->second[i];
+    }
+}
+
+void dynamics_place(const tree *t, const double *angle, double *r, double *p) {
+    static const double one[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1}, zero[3] = {0, 0, 0};
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        const tree_joint *joint = &t->joints[i];
+        const double *base_r = joint->parent < 0 ? one : r + 9 * joint->parent;
+        const double *base_p = joint->parent < 0 ? zero : p + 3 * joint->parent;
+        double *own_r = r + 9 * i, *own_p = p + 3 * i;
+        multiply3(base_r, joint->r, own_r);
+        place3(base_r, base_p, joint->p, own_p);
+        if (joint->kind == MHE_MOTION_ROTATION) {
+            double c = cos(angle[i]), s = sin(angle[i]);
+            for (int k = 0; k < 9; k += 3) {
+                double x = own_r[k], y = own_r[k + 1];
+                own_r[k] = c * x + s * y;
+                own_r[k + 1] = c * y - s * x;
+            }
+        } else {
+            for (int k = 0; k < 3; k++) {
+                own_p[k] += angle[i] * own_r[3 * k];
+            }
+        }
     }
 }
 

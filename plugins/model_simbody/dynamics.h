@@ -27,6 +27,10 @@ typedef struct link_motion {
     double rate[36]; /* composite: change of force with velocity, see dynamics_rates() */
 } link_motion;
 
+/* The links' placement in ground, r [n_joints x 9], p [n_joints x 3], at the joints' `angle` (rad
+ * or m). */
+void dynamics_place(const tree *tree, const double *angle, double *r, double *p);
+
 /* Axes from the links' placement: r [n_joints x 9], p [n_joints x 3]. Needed by all below. */
 void dynamics_axes(const tree *tree, const double *r, const double *p, link_motion *links);
 

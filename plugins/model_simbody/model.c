@@ -40,12 +40,17 @@ static mhe_status context_place(simbody_context *c, const double *q, const doubl
     if (!all_finite(c->slopes, 4 * (size_t)t->n_joints)) {
         return mhe_fail(err, MHE_RETRY, "a joint's function of its coordinate is not finite");
     }
-    mhe_status status = skeleton_place(c->skeleton, c->angle, c->r, c->p, err);
-    c->placed = status == MHE_OK;
-    if (c->placed) {
-        dynamics_axes(t, c->r, c->p, c->links);
+    if (c->dynamics == SIMBODY_DYNAMICS_SIMBODY) {
+        mhe_status status = skeleton_place(c->skeleton, c->angle, c->r, c->p, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    } else {
+        dynamics_place(t, c->angle, c->r, c->p);
     }
-    return status;
+    dynamics_axes(t, c->r, c->p, c->links);
+    c->placed = 1;
+    return MHE_OK;
 }
 
 static mhe_status context_mass(simbody_context *c, mhe_error *err) {

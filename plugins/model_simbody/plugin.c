@@ -4,8 +4,9 @@
 
 static const mhe_option simbody_options[] = {
     MHE_OPT_ENUM(struct simbody_config, dynamics, "recursive", "recursive|simbody",
-                 "Who computes mass matrix and torques from Simbody's poses: the plugin's own "
-                 "recursion (faster) or Simbody; derivatives are the recursion's."),
+                 "Who computes poses, mass matrix and torques: the plugin's own recursion (faster, "
+                 "its poses compared with Simbody's at load) or Simbody; derivatives are the "
+                 "recursion's."),
 };
 
 static const mhe_model_ops simbody_ops = {
