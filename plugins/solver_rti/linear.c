@@ -4,112 +4,191 @@
 
 #include <math.h>
 #include <string.h>
-#include <time.h>
 
-static double now(void) {
-    struct timespec time;
-    (void)clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
-}
-
-/* 0, or NaN where one of the values is not finite. */
+/* 0, or NaN where one of the values is not finite; in lanes, for a sum has to wait for itself. */
 static double finiteness(const double *values, int32_t n) {
-    double sum = 0;
-    for (int32_t i = 0; i < n; i++) {
+    double lanes[8] = {0}, sum = 0;
+    int32_t i = 0;
+    for (; i + 8 <= n; i += 8) {
+        for (int32_t j = 0; j < 8; j++) {
+            lanes[j] += values[i + j] - values[i + j];
+        }
+    }
+    for (; i < n; i++) {
         sum += values[i] - values[i];
+    }
+    for (int32_t j = 0; j < 8; j++) {
+        sum += lanes[j];
     }
     return sum;
 }
 
-static void pack_hessian(const rti_solver *s, int32_t has_u, double *grad, qp_stage *stage) {
+static double pack_costs(const rti_solver *s, const rti_worker *of, int32_t has_u,
+                         qp_stage *stage) {
     const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, ld = s->shape.ld_z;
+    const double scale = s->scale;
     for (int32_t i = 0; i < n_x; i++) {
         double *row = stage->H + (n_u + i) * ld + n_u;
         for (int32_t j = 0; j < n_x; j++) {
-            row[j] = s->scale * s->xx[i * n_x + j];
+            row[j] = scale * of->xx[i * n_x + j];
         }
-        stage->g[n_u + i] = s->scale * grad[i];
+        stage->g[n_u + i] = scale * of->grad_x[i];
     }
-    for (int32_t i = 0; i < n_u && has_u; i++) {
+    double sum = finiteness(of->grad_x, n_x) + finiteness(of->xx, n_x * n_x);
+    if (!has_u) {
+        return sum;
+    }
+    for (int32_t i = 0; i < n_u; i++) {
         double *row = stage->H + i * ld;
         for (int32_t j = 0; j < n_u; j++) {
-            row[j] = s->scale * s->uu[i * n_u + j];
+            row[j] = scale * of->uu[i * n_u + j];
         }
         for (int32_t j = 0; j < n_x; j++) {
-            row[n_u + j] = stage->H[(n_u + j) * ld + i] = s->scale * s->ux[i * n_x + j];
+            row[n_u + j] = stage->H[(n_u + j) * ld + i] = scale * of->ux[i * n_x + j];
         }
-        stage->g[i] = s->scale * s->grad_u[i];
+        stage->g[i] = scale * of->grad_u[i];
     }
+    return sum + finiteness(of->ux, n_u * n_x) + finiteness(of->uu, n_u * n_u) +
+           finiteness(of->grad_u, n_u);
 }
 
-static void pack_dynamics(const rti_solver *s, qp_stage *stage) {
+static double pack_dynamics(const rti_solver *s, const rti_worker *of, qp_stage *stage) {
     const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u;
     for (int32_t i = 0; i < s->shape.n_dense; i++) {
         double *row = stage->F + i * s->shape.ld_z;
-        memcpy(row, s->B + i * n_u, sizeof(double) * (size_t)n_u);
-        memcpy(row + n_u, s->A + i * n_x, sizeof(double) * (size_t)n_x);
+        memcpy(row, of->B + i * n_u, sizeof(double) * (size_t)n_u);
+        memcpy(row + n_u, of->A + i * n_x, sizeof(double) * (size_t)n_x);
     }
     for (int32_t i = s->shape.n_dense; i < n_x; i++) {
         const int32_t control = s->shape.control_of[i];
-        stage->by_state[i] = s->A[i * n_x + i];
-        stage->by_control[i] = control >= 0 ? s->B[i * n_u + control] : 0;
+        stage->by_state[i] = of->A[i * n_x + i];
+        stage->by_control[i] = control >= 0 ? of->B[i * n_u + control] : 0;
     }
+    return finiteness(of->A, n_x * n_x) + finiteness(of->B, n_x * n_u);
 }
 
-static mhe_status evaluate_stage(rti_solver *s, rti_point *point, int32_t k, int32_t derivatives,
-                                 double *cost) {
-    const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, has_u = k < s->shape.N;
-    const double *u = row_z(&s->shape, point->w, k), *x = u + n_u;
-    double *grad_x = s->slope; /* not in use while points are evaluated */
-    mhe_stage_values out = {.size = sizeof out, .cost = cost, .x_next = has_u ? s->x_next : NULL};
-    if (derivatives) {
-        out.grad_x = grad_x;
-        out.hess_xx = s->xx;
-        out.grad_u = has_u ? s->grad_u : NULL;
-        out.hess_ux = has_u ? s->ux : NULL;
-        out.hess_uu = has_u ? s->uu : NULL;
-        out.A = has_u ? s->A : NULL;
-        out.B = has_u ? s->B : NULL;
+static double pack_gap(const rti_solver *s, const rti_worker *of, const double *next, double *b) {
+    for (int32_t i = 0; i < s->shape.n_x; i++) {
+        b[i] = of->x_next[i] - next[i];
     }
-    mhe_status status = s->problem->evaluate(s->problem, 0, k, x, has_u ? u : NULL, &out, s->err);
+    return finiteness(b, s->shape.n_x);
+}
+
+/* What the threads share of one evaluation. */
+typedef struct task {
+    rti_solver *s;
+    rti_point *point;
+    int32_t wanted;
+} task;
+
+static mhe_stage_values values_wanted(const rti_worker *to, int32_t wanted, int32_t has_u,
+                                      double *cost) {
+    mhe_stage_values out = {.size = sizeof out};
+    if (wanted & RTI_COSTS) {
+        out.cost = cost;
+        if (wanted & RTI_DERIVATIVES) {
+            out.grad_x = to->grad_x;
+            out.hess_xx = to->xx;
+            out.grad_u = has_u ? to->grad_u : NULL;
+            out.hess_ux = has_u ? to->ux : NULL;
+            out.hess_uu = has_u ? to->uu : NULL;
+        }
+    }
+    if ((wanted & RTI_DYNAMICS) && has_u) {
+        out.x_next = to->x_next;
+        if (wanted & RTI_DERIVATIVES) {
+            out.A = to->A;
+            out.B = to->B;
+        }
+    }
+    return out;
+}
+
+static mhe_status evaluate_stage(const task *t, int32_t worker, int32_t k) {
+    rti_solver *s = t->s;
+    rti_worker *of = &s->workers[worker];
+    qp_stage *stage = &t->point->stages[k];
+    const int32_t has_u = k < s->shape.N, derivatives = t->wanted & RTI_DERIVATIVES;
+    const double *u = row_z(&s->shape, t->point->w, k), *x = u + s->shape.n_u;
+    const mhe_stage_values out = values_wanted(of, t->wanted, has_u, &s->stage_cost[k]);
+    mhe_status status =
+        s->problem->evaluate(s->problem, worker, k, x, has_u ? u : NULL, &out, &of->error);
     if (status != MHE_OK) {
+        of->error_stage = k;
         return status;
     }
-    double sum = *cost - *cost;
-    if (derivatives) {
-        sum += finiteness(grad_x, n_x) + finiteness(s->xx, n_x * n_x);
-        pack_hessian(s, has_u, grad_x, &point->stages[k]);
+    double sum = 0;
+    if (t->wanted & RTI_COSTS) {
+        sum += s->stage_cost[k] - s->stage_cost[k];
+        sum += derivatives ? pack_costs(s, of, has_u, stage) : 0;
     }
-    if (has_u) {
-        double *b = point->stages[k].b;
-        const double *next = row_z(&s->shape, point->w, k + 1) + n_u;
-        for (int32_t i = 0; i < n_x; i++) {
-            b[i] = s->x_next[i] - next[i];
-        }
-        sum += finiteness(b, n_x);
-    }
-    if (has_u && derivatives) { /* the arrays of this stage lie one behind the other */
-        sum += finiteness(s->ux, n_u * n_x) + finiteness(s->uu, n_u * n_u) +
-               finiteness(s->grad_u, n_u) + finiteness(s->A, n_x * n_x) +
-               finiteness(s->B, n_x * n_u);
-        pack_dynamics(s, &point->stages[k]);
+    if (out.x_next != NULL) {
+        const double *next = row_z(&s->shape, t->point->w, k + 1) + s->shape.n_u;
+        sum += pack_gap(s, of, next, stage->b);
+        sum += derivatives ? pack_dynamics(s, of, stage) : 0;
     }
     return sum == 0 ? MHE_OK : MHE_RETRY;
 }
 
-int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t derivatives) {
-    const double start = now();
-    mhe_status status = MHE_OK;
-    point->cost = 0;
-    for (int32_t k = 0; k <= s->shape.N && status == MHE_OK; k++) {
-        double cost = 0;
-        status = evaluate_stage(s, point, k, derivatives, &cost);
-        point->cost += s->scale * cost;
+static int32_t work(void *data, int32_t worker, int32_t k) {
+    const task *t = data;
+    t->s->stage_status[k] = evaluate_stage(t, worker, k);
+    return t->s->stage_status[k] != MHE_OK;
+}
+
+/* The status of the first stage that has no values, with its reason: all before it were tried. */
+static mhe_status first_failure(rti_solver *s) {
+    for (int32_t k = 0; k <= s->shape.N; k++) {
+        if (s->stage_status[k] == MHE_OK) {
+            continue;
+        }
+        for (int32_t i = 0; i < s->problem->n_workers && s->err != NULL; i++) {
+            if (s->workers[i].error_stage == k) {
+                *s->err = s->workers[i].error;
+            }
+        }
+        return s->stage_status[k];
     }
-    point->damping = derivatives ? 0 : point->damping;
-    s->seconds += now() - start;
+    return MHE_OK;
+}
+
+int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t wanted) {
+    const double start = rti_now();
+    task t = {.s = s, .point = point, .wanted = wanted};
+    memset(s->stage_status, 0, sizeof(mhe_status) * (size_t)(s->shape.N + 1));
+    for (int32_t i = 0; i < s->problem->n_workers; i++) {
+        s->workers[i].error_stage = -1;
+    }
+    /* Costs alone are quicker done than others are woken; the last stage has no dynamics. */
+    const int32_t n_stages = s->shape.N + ((wanted & RTI_COSTS) != 0);
+    rti_pool_run(wanted & RTI_DYNAMICS ? s->pool : NULL, n_stages, work, &t);
+    const mhe_status status = first_failure(s);
+    if (wanted & RTI_COSTS) {
+        point->cost = 0;
+        for (int32_t k = 0; k <= s->shape.N && status == MHE_OK; k++) {
+            point->cost += s->scale * s->stage_cost[k];
+        }
+        point->damping = wanted & RTI_DERIVATIVES ? 0 : point->damping;
+    }
+    s->seconds += rti_now() - start;
     s->failure = status < 0 ? status : MHE_OK;
     return status == MHE_OK;
+}
+
+double rti_first_gap(rti_solver *s, const double *w) {
+    const double start = rti_now();
+    const rti_worker *of = &s->workers[0];
+    const mhe_stage_values out = {.size = sizeof out, .x_next = of->x_next};
+    const double *x = w + s->shape.n_u, *next = w + s->shape.ld_z + s->shape.n_u;
+    const mhe_status status = s->problem->evaluate(s->problem, 0, 0, x, w, &out, s->err);
+    const int32_t known = status == MHE_OK && finiteness(of->x_next, s->shape.n_x) == 0;
+    double gap = known ? 0 : INFINITY;
+    for (int32_t i = 0; known && i < s->shape.n_x; i++) {
+        gap = fmax(gap, fabs(of->x_next[i] - next[i]));
+    }
+    s->seconds += rti_now() - start;
+    s->failure = status < 0 ? status : MHE_OK;
+    return gap;
 }
 
 /* Calls for each diagonal element of the Hessians that belongs to controls or to states. */

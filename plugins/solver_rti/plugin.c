@@ -32,10 +32,18 @@ static const mhe_option rti_options[] = {
     MHE_OPT_REAL(struct rti_config, objective_scale, 0, 0, 1e12, "1",
                  "Factor on the objective; 0: makes the mean curvature of the controls 1 at the "
                  "first start."),
+    MHE_OPT_REAL(struct rti_config, settled, 0.05, 1e-12, 1e12, "1",
+                 "speed, balanced: largest last change of the first control and the second state "
+                 "(rad, rad/s, 1) of a converged window."),
+    MHE_OPT_REAL(struct rti_config, spin, 50e-6, 0, 1, "s",
+                 "How long threads look for work before they sleep."),
 };
 
-static const mhe_solver_ops rti_ops = {
-    .size = sizeof rti_ops, .create = rti_create, .destroy = rti_destroy, .solve = rti_solve};
+static const mhe_solver_ops rti_ops = {.size = sizeof rti_ops,
+                                       .create = rti_create,
+                                       .destroy = rti_destroy,
+                                       .solve = rti_solve,
+                                       .prepare = rti_prepare};
 
 static const mhe_plugin rti_plugin = {
     .size = sizeof rti_plugin,

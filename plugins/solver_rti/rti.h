@@ -8,6 +8,7 @@
 #ifndef RTI_H
 #define RTI_H
 
+#include "pool.h"
 #include "qp.h"
 
 enum { RTI_SPEED, RTI_BALANCED, RTI_ROBUST };
@@ -19,6 +20,8 @@ struct rti_config { /* filled from the option table of plugin.c */
     int32_t max_qp_iterations;
     double regularisation;
     double objective_scale;
+    double settled;
+    double spin;
 };
 
 /* The problem at one iterate. */
@@ -34,6 +37,23 @@ typedef struct rti_residuals {
     double stationarity, gap, complementarity;
 } rti_residuals;
 
+/* One stage as evaluate() writes it, and why it did not; one thread's. */
+typedef struct rti_worker {
+    double *xx, *ux, *uu, *A, *B, *grad_x, *grad_u, *x_next;
+    mhe_error error;
+    int32_t error_stage;
+} rti_worker;
+
+/* The step that ends a real-time iteration: nothing but the first gap is evaluated behind it. */
+typedef struct rti_leap {
+    int32_t taken;
+    int32_t solved;   /* the program was, to its tolerance */
+    double length;    /* part of its step */
+    double front;     /* its longest component among those of u_0 and x_1 */
+    double first_gap; /* largest |x_1 - F_0| at the result */
+    double cost;      /* scaled, of the quadratic model at the result */
+} rti_leap;
+
 typedef struct rti_solver {
     const mhe_host *host;
     const struct rti_config *config;
@@ -41,25 +61,40 @@ typedef struct rti_solver {
     qp_shape shape;
     qp qp;
     rti_point here, trial;
-    double *lower, *upper;                          /* [size_z] of w */
-    double *lambda, *z_lower, *z_upper;             /* at `here` */
-    double *slope, *gaps;                           /* scratch [size_z], [size_x] */
-    double *xx, *ux, *uu, *A, *B, *grad_u, *x_next; /* one stage as evaluate() writes it */
-    double scale;                                   /* of the objective; 0 before the first solve */
-    double penalty; /* of the gaps in the merit function; this solve's */
-    double damping; /* Levenberg's, of the next step */
-    int32_t warm;   /* the multipliers are worth a start */
-    double gap_sum; /* at `here` */
-    rti_residuals residuals;
-    double seconds;     /* spent in evaluate() */
-    mhe_status failure; /* negative status of evaluate() */
-    mhe_error *err;     /* the caller's, for its text */
+    int32_t prepared;                   /* `here` holds its dynamics, from prepare() */
+    double *lower, *upper;              /* [size_z] of w */
+    double *lambda, *z_lower, *z_upper; /* at `here` */
+    double *slope, *gaps;               /* scratch [size_z], [size_x] */
+    rti_pool *pool;
+    rti_worker *workers;      /* [n_workers of the problem] */
+    double *stage_cost;       /* [N+1] of the last evaluation, not scaled */
+    mhe_status *stage_status; /* [N+1] */
+    double scale;             /* of the objective; 0 before the first solve */
+    double penalty;           /* of the gaps in the merit function; this solve's */
+    double damping;           /* Levenberg's, of the next step */
+    int32_t warm;             /* the multipliers are worth a start */
+    double gap_sum;           /* at `here` */
+    rti_residuals residuals;  /* at the last linearisation */
+    rti_leap leap;            /* of the last step, if a real-time iteration ended with it */
+    double deadline;          /* this solve's; infinity: none */
+    double iteration_time;    /* s, of this solve's last iteration */
+    double seconds;           /* spent in evaluate() */
+    mhe_status failure;       /* negative status of evaluate() */
+    mhe_error *err;           /* the caller's, for its text */
     void *memory;
 } rti_solver;
 
-/* linear.c: evaluates all stages at point->w, with derivatives or values alone (cost and b). 0: the
- * point has no value, or evaluate() failed (solver->failure). */
-int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t derivatives);
+/* linear.c: evaluates stages at point->w; what of them is wanted: */
+#define RTI_DYNAMICS 1    /* b; with derivatives F too */
+#define RTI_COSTS 2       /* cost; with derivatives H and g too */
+#define RTI_DERIVATIVES 4 /* of those wanted */
+#define RTI_ALL 7
+/* 0: the point has no value, or evaluate() failed (solver->failure). What is asked for alone is bit
+ * by bit what it is together with other parts, if evaluate() keeps to that, and so it is with any
+ * number of threads. */
+int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t wanted);
+/* Largest |x_1 - F_0(x_0, u_0)| at w; infinite without a value there. */
+double rti_first_gap(rti_solver *s, const double *w);
 /* One over the geometric mean of the controls' positive curvatures (of the states' where there are
  * none): the scale of the objective, as in solver_ipopt. */
 double rti_scale_of(const rti_solver *s, const rti_point *point);
@@ -70,19 +105,25 @@ double rti_gap_sum(const rti_solver *s, const rti_point *point);
 /* Residuals at `here`; leaves the slope of the Lagrangian without bounds in s->slope. */
 void rti_measure(rti_solver *s);
 
-/* step.c: one iteration from `here`, whose derivatives are known. `last`: the new point is
- * wanted with values alone. */
+/* step.c: one iteration from `here`, whose derivatives are known. */
 #define RTI_MOVED 0
 #define RTI_STUCK 1      /* no step helps */
 #define RTI_INFEASIBLE 2 /* ... towards the bounds and the dynamics both */
-#define RTI_SMALL 3      /* moved, by less than the tolerance */
-int32_t rti_step_full(rti_solver *s, int32_t last);
+#define RTI_LATE 3       /* the deadline passed before a step was found */
+int32_t rti_step_full(rti_solver *s);
 int32_t rti_step_globalised(rti_solver *s);
+/* The last step of a real-time iteration: `here` moves, its stages stay those of the linearisation;
+ * fills s->leap. */
+int32_t rti_leap_on(rti_solver *s);
 
-/* sqp.c */
+/* create.c */
 mhe_status rti_create(const mhe_host *host, const mhe_stage_problem *problem, const void *config,
                       void **self, mhe_error *err);
 void rti_destroy(void *self);
+double rti_now(void); /* s of CLOCK_MONOTONIC */
+
+/* sqp.c */
+mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err);
 mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution *solution,
                      mhe_solve_info *info, mhe_error *err);
 

@@ -1,94 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* sqp.c: a solve: start, iterations, result. */
+/* sqp.c: a solve: preparation, start, iterations, result. */
 #include "rti.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-/* ---- memory: one block ---- */
-
-static size_t stage_doubles(const qp_shape *s) { /* of what evaluate() writes */
-    const size_t n_x = (size_t)s->n_x, n_u = (size_t)s->n_u;
-    return n_x * n_x * 2 + n_u * n_x * 2 + n_u * n_u + n_u + n_x;
-}
-
-static double *take(double **memory, size_t n) {
-    double *piece = *memory;
-    *memory += n;
-    return piece;
-}
-
-static void place(rti_solver *s) {
-    const qp_shape *shape = &s->shape;
-    const size_t z = size_z(shape), x = size_x(shape), n_x = (size_t)shape->n_x,
-                 n_u = (size_t)shape->n_u, n_stages = (size_t)shape->N + 1;
-    double *m = s->memory;
-    qp_place(&s->qp, shape, m);
-    m += qp_size(shape) / sizeof(double);
-    rti_point *const points[] = {&s->here, &s->trial};
-    for (int i = 0; i < 2; i++) {
-        points[i]->w = take(&m, z);
-        qp_stage *stages = (qp_stage *)m;
-        m += n_stages * sizeof(qp_stage) / sizeof(double);
-        qp_stages_place(shape, take(&m, qp_stages_size(shape)), stages);
-        points[i]->stages = stages;
-    }
-    double **const of_z[] = {&s->lower, &s->upper, &s->z_lower, &s->z_upper, &s->slope};
-    for (size_t i = 0; i < sizeof of_z / sizeof of_z[0]; i++) {
-        *of_z[i] = take(&m, z);
-    }
-    s->lambda = take(&m, x);
-    s->gaps = take(&m, x);
-    s->xx = take(&m, n_x * n_x);
-    s->A = take(&m, n_x * n_x);
-    s->ux = take(&m, n_u * n_x);
-    s->B = take(&m, n_u * n_x);
-    s->uu = take(&m, n_u * n_u);
-    s->grad_u = take(&m, n_u);
-    s->x_next = take(&m, n_x);
-}
-
-static size_t memory_size(const qp_shape *s) {
-    const size_t points = 2 * (size_z(s) + qp_stages_size(s)) * sizeof(double) +
-                          2 * ((size_t)s->N + 1) * sizeof(qp_stage);
-    const size_t bytes =
-        qp_size(s) + points + (5 * size_z(s) + 2 * size_x(s) + stage_doubles(s)) * sizeof(double);
-    return (bytes + 63) / 64 * 64;
-}
-
-mhe_status rti_create(const mhe_host *host, const mhe_stage_problem *problem, const void *config,
-                      void **self, mhe_error *err) {
-    rti_solver *s = calloc(1, sizeof *s);
-    int32_t *control_of = calloc((size_t)problem->n_x, sizeof *control_of);
-    if (s != NULL && control_of != NULL) {
-        s->host = host;
-        s->config = config;
-        s->problem = problem;
-        qp_shape_of(problem, control_of, &s->shape);
-        s->memory = aligned_alloc(64, memory_size(&s->shape));
-    }
-    if (s == NULL || control_of == NULL || s->memory == NULL) {
-        free(s);
-        free(control_of);
-        return mhe_fail(err, MHE_E_MEMORY, "no memory for %d intervals of %d states, %d controls",
-                        (int)problem->n_intervals, (int)problem->n_x, (int)problem->n_u);
-    }
-    memset(s->memory, 0, memory_size(&s->shape));
-    place(s);
-    *self = s;
-    return MHE_OK;
-}
-
-void rti_destroy(void *self) {
-    rti_solver *s = self;
-    if (s != NULL) {
-        free((void *)s->shape.control_of);
-        free(s->memory);
-        free(s);
-    }
-}
 
 /* ---- between the caller's arrays x [(N+1) x n_x], u [N x n_u] and vectors of all w ---- */
 
@@ -138,14 +53,19 @@ static int32_t read_bounds(rti_solver *s, int32_t *n_free) {
     return 1;
 }
 
-/* The start, moved into the bounds, and its multipliers where they can be used. 0: not finite. */
+/* The start, moved into the bounds, and its multipliers where they can be used; what was prepared
+ * elsewhere is forgotten. 0: not finite. */
 static int32_t read_start(rti_solver *s, const mhe_solution *start) {
     const qp_shape *shape = &s->shape;
     const size_t n = size_z(shape);
-    gather(shape, start->x, start->u, s->here.w);
-    const int32_t finite = is_finite(s->here.w, n);
+    gather(shape, start->x, start->u, s->trial.w);
+    const int32_t finite = is_finite(s->trial.w, n);
     for (size_t i = 0; i < n; i++) {
-        s->here.w[i] = fmin(fmax(s->here.w[i], s->lower[i]), s->upper[i]);
+        s->trial.w[i] = fmin(fmax(s->trial.w[i], s->lower[i]), s->upper[i]);
+    }
+    if (!s->prepared || memcmp(s->trial.w, s->here.w, sizeof(double) * n) != 0) {
+        memcpy(s->here.w, s->trial.w, sizeof(double) * n);
+        s->prepared = 0;
     }
     s->warm = start->has_multipliers;
     if (s->warm) {
@@ -176,7 +96,10 @@ static int32_t begin(rti_solver *s) {
     if (first) {
         s->scale = s->config->objective_scale > 0 ? s->config->objective_scale : 1;
     }
-    if (!rti_evaluate(s, &s->here, 1)) {
+    const int32_t known =
+        rti_evaluate(s, &s->here, s->prepared ? RTI_COSTS | RTI_DERIVATIVES : RTI_ALL);
+    s->prepared = 0; /* from here on the steps use the memory */
+    if (!known) {
         s->scale = first ? 0 : s->scale;
         return 0;
     }
@@ -191,12 +114,6 @@ static int32_t begin(rti_solver *s) {
         s->warm = 0;
     }
     return 1;
-}
-
-static double now(void) {
-    struct timespec time;
-    (void)clock_gettime(CLOCK_MONOTONIC, &time);
-    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
 }
 
 static double worst(const rti_residuals *r) {
@@ -225,21 +142,18 @@ static int32_t verdict(const rti_solver *s, const mhe_solve_control *control, in
     if (iteration >= limit) {
         return MHE_SOLVE_ITERATION_LIMIT;
     }
-    if (control != NULL && control->deadline > 0 && now() >= control->deadline) {
+    /* The next iteration will take about as long as the last one. */
+    if (isfinite(s->deadline) && rti_now() + s->iteration_time >= s->deadline) {
         return MHE_SOLVE_DEADLINE;
     }
     return -1;
 }
 
 /* Multipliers of the caller's objective. Those of fixed variables are what makes the Lagrangian
- * stationary; where only values are known at the result, those of the last program. */
-static void write_multipliers(rti_solver *s, int32_t derivatives, mhe_solution *out) {
+ * stationary; after a leap, that of the last program. */
+static void write_multipliers(rti_solver *s, mhe_solution *out) {
     const qp_shape *shape = &s->shape;
-    if (derivatives) {
-        qp_slope(shape, s->here.stages, NULL, s->lambda, s->slope);
-    } else {
-        qp_slope(shape, s->trial.stages, s->qp.w, s->lambda, s->slope);
-    }
+    qp_slope(shape, s->here.stages, s->leap.taken ? s->qp.w : NULL, s->lambda, s->slope);
     for (size_t i = 0; i < size_z(shape); i++) {
         if (s->lower[i] == s->upper[i]) {
             s->z_lower[i] = fmax(0, s->slope[i]);
@@ -258,18 +172,24 @@ static void write_multipliers(rti_solver *s, int32_t derivatives, mhe_solution *
     out->has_multipliers = 1;
 }
 
-static void write_result(rti_solver *s, int32_t derivatives, mhe_solution *out,
-                         mhe_solve_info *info) {
-    scatter(&s->shape, s->here.w, out->x, out->u);
-    write_multipliers(s, derivatives, out);
-    info->objective = s->here.cost / s->scale;
-    info->kkt_residual = worst(&s->residuals);
-    info->primal_residual = 0;
+static double largest_gap(rti_solver *s) {
+    double largest = 0;
     for (int32_t k = 0; k < s->shape.N; k++) {
         for (int32_t i = 0; i < s->shape.n_x; i++) {
-            info->primal_residual = fmax(info->primal_residual, fabs(s->here.stages[k].b[i]));
+            largest = fmax(largest, fabs(s->here.stages[k].b[i]));
         }
     }
+    return largest;
+}
+
+static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info) {
+    const rti_leap *leap = &s->leap;
+    const double gap = largest_gap(s);
+    scatter(&s->shape, s->here.w, out->x, out->u);
+    write_multipliers(s, out);
+    info->objective = (leap->taken ? leap->cost : s->here.cost) / s->scale;
+    info->kkt_residual = worst(&s->residuals);
+    info->primal_residual = leap->taken ? fmax(leap->first_gap, (1 - leap->length) * gap) : gap;
 }
 
 /* Real-time iterations need a start near the solution: multipliers and a given first state. Any
@@ -284,9 +204,27 @@ static int32_t iteration_limit(const rti_solver *s) {
     return is_real_time(s) && most[s->config->preset] < given ? most[s->config->preset] : given;
 }
 
-/* From the evaluated start; gives MHE_SOLVE_*. `derivatives`: are they known at the result? */
-static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t *iterations,
-                       int32_t *derivatives) {
+/* What a leap came to. It is not measured again, so converged means what can be said of the node
+ * that leaves the window next, after as many iterations as there are intervals: it is a motion of
+ * the model, and it no longer moved much, which bounds what another iteration would change. */
+static int32_t judge(const rti_solver *s) {
+    const rti_leap *leap = &s->leap;
+    return leap->solved && leap->length == 1 && leap->first_gap <= s->config->tolerance &&
+                   leap->front <= s->config->settled
+               ? MHE_SOLVE_CONVERGED
+               : MHE_SOLVE_ITERATION_LIMIT;
+}
+
+static void tell_progress(const rti_solver *s, const mhe_solve_control *control,
+                          int32_t iterations) {
+    if (control != NULL && control->progress != NULL) {
+        (void)control->progress(control->data, iterations, s->leap.cost / s->scale,
+                                worst(&s->residuals));
+    }
+}
+
+/* From the evaluated start; gives MHE_SOLVE_*. */
+static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t *iterations) {
     const int32_t limit = iteration_limit(s), real_time = is_real_time(s);
     s->penalty = s->damping = 0;
     for (*iterations = 0;;) {
@@ -295,10 +233,17 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
         if (outcome >= 0) {
             return outcome;
         }
+        const double begin = rti_now();
         const int32_t last = real_time && *iterations + 1 == limit;
-        const int32_t result = real_time ? rti_step_full(s, last) : rti_step_globalised(s);
+        const int32_t result = last        ? rti_leap_on(s)
+                               : real_time ? rti_step_full(s)
+                                           : rti_step_globalised(s);
+        s->iteration_time = rti_now() - begin;
         if (result == RTI_STUCK) {
             return MHE_SOLVE_FAILED;
+        }
+        if (result == RTI_LATE) {
+            return MHE_SOLVE_DEADLINE;
         }
         *iterations += 1;
         if (result == RTI_INFEASIBLE) {
@@ -306,25 +251,33 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
             return MHE_SOLVE_INFEASIBLE;
         }
         if (last) {
-            *derivatives = 0;
-            if (control != NULL && control->progress != NULL) {
-                (void)control->progress(control->data, *iterations, s->here.cost / s->scale,
-                                        worst(&s->residuals));
-            }
-            return result == RTI_SMALL ? MHE_SOLVE_CONVERGED : MHE_SOLVE_ITERATION_LIMIT;
+            tell_progress(s, control, *iterations);
+            return judge(s);
         }
     }
+}
+
+mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err) {
+    rti_solver *s = self;
+    gather(&s->shape, start->x, start->u, s->here.w);
+    s->err = err;
+    s->prepared = 0;
+    s->failure = MHE_OK;
+    if (is_finite(s->here.w, size_z(&s->shape))) {
+        s->prepared = rti_evaluate(s, &s->here, RTI_DYNAMICS | RTI_DERIVATIVES);
+    }
+    return s->failure;
 }
 
 mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution *solution,
                      mhe_solve_info *info, mhe_error *err) {
     rti_solver *s = self;
-    int32_t n_free = 0, derivatives = 1;
-    info->outcome = MHE_SOLVE_FAILED;
-    info->iterations = 0;
-    info->objective = NAN;
-    info->evaluation_time = 0;
-    info->kkt_residual = info->primal_residual = INFINITY;
+    int32_t n_free = 0;
+    *info = (mhe_solve_info){.size = info->size,
+                             .outcome = MHE_SOLVE_FAILED,
+                             .objective = NAN,
+                             .kkt_residual = INFINITY,
+                             .primal_residual = INFINITY};
     if (!read_bounds(s, &n_free)) {
         info->outcome = MHE_SOLVE_INFEASIBLE;
         return MHE_OK;
@@ -338,11 +291,18 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
     }
     s->err = err;
     s->failure = MHE_OK;
-    s->seconds = 0;
+    s->seconds = s->iteration_time = 0;
+    s->leap = (rti_leap){0};
+    s->deadline = control != NULL && control->deadline > 0 ? control->deadline : INFINITY;
+    if (isfinite(s->deadline) && rti_now() >= s->deadline) { /* at once */
+        info->outcome = MHE_SOLVE_DEADLINE;
+        info->primal_residual = s->prepared ? largest_gap(s) : INFINITY;
+        return MHE_OK;
+    }
     if (begin(s)) {
-        info->outcome = iterate(s, control, &info->iterations, &derivatives);
+        info->outcome = iterate(s, control, &info->iterations);
         if (s->failure == MHE_OK) {
-            write_result(s, derivatives, solution, info);
+            write_result(s, solution, info);
         }
     }
     info->evaluation_time = s->seconds;

@@ -33,15 +33,21 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
     return qp_solve(q, s->here.stages, &limits, s->warm);
 }
 
-/* trial.w = here.w + length * step, within the bounds; its longest component. */
-static double reach(rti_solver *s, double length) {
-    double longest = 0;
+/* trial.w = here.w + length * step, within the bounds. */
+static void reach(rti_solver *s, double length) {
     for (size_t i = 0; i < size_z(&s->shape); i++) {
         const double w = s->here.w[i] + length * s->qp.w[i];
         s->trial.w[i] = fmin(fmax(w, s->lower[i]), s->upper[i]);
-        longest = fmax(longest, fabs(s->trial.w[i] - s->here.w[i]));
     }
-    return longest;
+}
+
+/* Longest component of the step to the trial point in n variables. */
+static double longest(const rti_solver *s, int32_t from, int32_t n) {
+    double length = 0;
+    for (int32_t i = from; i < from + n; i++) {
+        length = fmax(length, fabs(s->trial.w[i] - s->here.w[i]));
+    }
+    return length;
 }
 
 static void blend(double length, size_t n, const double *to, double *from) {
@@ -50,29 +56,82 @@ static void blend(double length, size_t n, const double *to, double *from) {
     }
 }
 
-/* The trial point becomes `here`. */
-static void accept(rti_solver *s, double length) {
+static void accept_multipliers(rti_solver *s, double length) {
     const size_t n = size_z(&s->shape);
-    const rti_point old = s->here;
-    s->here = s->trial;
-    s->trial = old;
     blend(length, size_x(&s->shape), s->qp.lambda, s->lambda);
     blend(length, n, s->qp.z_lower, s->z_lower);
     blend(length, n, s->qp.z_upper, s->z_upper);
     s->warm = 1;
 }
 
-int32_t rti_step_full(rti_solver *s, int32_t last) {
+/* The trial point becomes `here`. */
+static void accept(rti_solver *s, double length) {
+    const rti_point old = s->here;
+    s->here = s->trial;
+    s->trial = old;
+    accept_multipliers(s, length);
+}
+
+int32_t rti_step_full(rti_solver *s) {
     rti_set_damping(s, &s->here, s->config->regularisation);
     if (solve_program(s, 0) == QP_FAILED) {
         return RTI_STUCK;
     }
     double length = 1;
     for (int32_t i = 0; i <= MAX_HALVINGS; i++, length /= 2) {
-        const double longest = reach(s, length);
-        if (rti_evaluate(s, &s->trial, !last)) {
+        reach(s, length);
+        if (rti_evaluate(s, &s->trial, RTI_ALL)) {
             accept(s, length);
-            return i == 0 && longest <= s->config->tolerance ? RTI_SMALL : RTI_MOVED;
+            return RTI_MOVED;
+        }
+        if (s->failure != MHE_OK) {
+            break;
+        }
+    }
+    return RTI_STUCK;
+}
+
+/* The quadratic model without its damping at the trial point, scaled. */
+static double model_cost(rti_solver *s) {
+    const qp_shape *shape = &s->shape;
+    double cost = s->here.cost;
+    for (int32_t k = 0; k <= shape->N; k++) {
+        const double *from = row_z(shape, s->here.w, k), *to = row_z(shape, s->trial.w, k);
+        double *step = row_z(shape, s->slope, k), *slope = row_z(shape, s->qp.slope, k);
+        for (int32_t i = 0; i < shape->ld_z; i++) {
+            step[i] = to[i] - from[i];
+            slope[i] = s->here.stages[k].g[i] - 0.5 * s->here.damping * step[i];
+        }
+        shape->kernels->add_transposed(shape->n_z, shape->n_z, 0.5, s->here.stages[k].H,
+                                       shape->ld_z, step, slope);
+        for (int32_t i = 0; i < shape->n_z; i++) {
+            cost += slope[i] * step[i];
+        }
+    }
+    return cost;
+}
+
+int32_t rti_leap_on(rti_solver *s) {
+    rti_leap *leap = &s->leap;
+    rti_set_damping(s, &s->here, s->config->regularisation);
+    const int32_t result = solve_program(s, 0);
+    if (result == QP_FAILED) {
+        return RTI_STUCK;
+    }
+    *leap = (rti_leap){.solved = result == QP_SOLVED, .length = 1};
+    for (int32_t i = 0; i <= MAX_HALVINGS; i++, leap->length /= 2) {
+        reach(s, leap->length);
+        leap->first_gap = rti_first_gap(s, s->trial.w);
+        if (isfinite(leap->first_gap)) {
+            leap->taken = 1;
+            leap->front = fmax(longest(s, 0, s->shape.n_u),
+                               longest(s, s->shape.ld_z + s->shape.n_u, s->shape.n_x));
+            leap->cost = model_cost(s);
+            double *const from = s->here.w;
+            s->here.w = s->trial.w;
+            s->trial.w = from;
+            accept_multipliers(s, leap->length);
+            return RTI_MOVED;
         }
         if (s->failure != MHE_OK) {
             break;
@@ -82,6 +141,10 @@ int32_t rti_step_full(rti_solver *s, int32_t last) {
 }
 
 /* ---- globalised by an exact penalty: merit = cost + penalty * sum |gap| ---- */
+
+static int32_t is_late(const rti_solver *s) {
+    return isfinite(s->deadline) && rti_now() >= s->deadline;
+}
 
 static double merit(const rti_solver *s, const rti_point *point) {
     return point->cost + s->penalty * rti_gap_sum(s, point);
@@ -129,8 +192,8 @@ static int32_t second_look(rti_solver *s, double slope) {
         memcpy(s->here.stages[k].b, row_x(shape, s->gaps, k), bytes);
     }
     if (result == QP_SOLVED) {
-        (void)reach(s, 1);
-        if (rti_evaluate(s, &s->trial, 1) && is_better(s, 1, slope)) {
+        reach(s, 1);
+        if (rti_evaluate(s, &s->trial, RTI_ALL) && is_better(s, 1, slope)) {
             return 1;
         }
     }
@@ -143,11 +206,11 @@ static int32_t second_look(rti_solver *s, double slope) {
 static double search(rti_solver *s, double slope) {
     double length = 0.5;
     for (int32_t i = 0; i < MAX_HALVINGS; i++, length /= 2) {
-        (void)reach(s, length);
-        if (rti_evaluate(s, &s->trial, 0) && is_better(s, length, slope)) {
-            return rti_evaluate(s, &s->trial, 1) ? length : 0;
+        reach(s, length);
+        if (rti_evaluate(s, &s->trial, RTI_DYNAMICS | RTI_COSTS) && is_better(s, length, slope)) {
+            return rti_evaluate(s, &s->trial, RTI_ALL) ? length : 0;
         }
-        if (s->failure != MHE_OK) {
+        if (s->failure != MHE_OK || is_late(s)) {
             return 0;
         }
     }
@@ -166,15 +229,15 @@ static void adapt_damping(rti_solver *s, double length) {
 /* Tries the step of a solved program; the part of it that was gone, 0: none. */
 static double try_step(rti_solver *s, int32_t result) {
     const double slope = merit_slope(s);
-    (void)reach(s, 1);
-    const int32_t known = rti_evaluate(s, &s->trial, 1);
+    reach(s, 1);
+    const int32_t known = rti_evaluate(s, &s->trial, RTI_ALL);
     if (known && is_better(s, 1, slope)) {
         return 1;
     }
-    if (known && result == QP_SOLVED && second_look(s, slope)) {
+    if (known && result == QP_SOLVED && !is_late(s) && second_look(s, slope)) {
         return 1;
     }
-    return s->failure == MHE_OK ? search(s, slope) : 0;
+    return s->failure == MHE_OK && !is_late(s) ? search(s, slope) : 0;
 }
 
 int32_t rti_step_globalised(rti_solver *s) {
@@ -191,6 +254,9 @@ int32_t rti_step_globalised(rti_solver *s) {
         }
         if (s->failure != MHE_OK) {
             break;
+        }
+        if (is_late(s)) {
+            return RTI_LATE;
         }
         if (result == QP_INFEASIBLE) {
             return RTI_INFEASIBLE;

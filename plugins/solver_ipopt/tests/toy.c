@@ -127,6 +127,7 @@ static mhe_status evaluate(const mhe_stage_problem *problem, int32_t worker, int
     (void)worker;
     t->evaluations++;
     t->linearisations += out->grad_x != NULL || out->A != NULL;
+    t->steps += out->x_next != NULL;
     if (t->failure != MHE_OK) {
         return mhe_fail(err, t->failure, "the toy was told to fail at node %d", (int)k);
     }

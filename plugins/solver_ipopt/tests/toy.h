@@ -7,6 +7,7 @@
 #define TOY_H
 
 #include <mhe/solver.h>
+#include <stdatomic.h>
 
 #define TOY_MAX_X 32
 #define TOY_MAX_U 24
@@ -31,13 +32,14 @@ struct toy {
     int substeps;
     double *bounds; /* memory of the four bound arrays */
     uint8_t *pattern;
-    const double *target; /* for the residuals */
-    double retry_above;   /* MHE_RETRY where x[0] is above this */
-    double nan_above;     /* cost NaN where x[0] is above this */
-    mhe_status failure;   /* returned by every evaluation, if not MHE_OK */
-    long evaluations;     /* of all stages */
-    long linearisations;  /* those with derivatives */
-    long retries;         /* evaluations that had no value */
+    const double *target;       /* for the residuals */
+    double retry_above;         /* MHE_RETRY where x[0] is above this */
+    double nan_above;           /* cost NaN where x[0] is above this */
+    mhe_status failure;         /* returned by every evaluation, if not MHE_OK */
+    atomic_long evaluations;    /* of all stages */
+    atomic_long linearisations; /* those with derivatives */
+    atomic_long steps;          /* those of the dynamics */
+    atomic_long retries;        /* evaluations that had no value */
 };
 
 /* Sets up sizes, infinite bounds and full patterns; free with toy_free. */
