@@ -80,6 +80,7 @@ static mhe_status context_allocate(simbody_context *c) {
                  {&c->speed, n},
                  {&c->acceleration, n},
                  {&c->torque, n},
+                 {&c->rounding_torque, n},
                  {&c->r, 9 * n},
                  {&c->p, 3 * n},
                  {&c->joint_mass, n * n},
@@ -97,6 +98,13 @@ static mhe_status context_allocate(simbody_context *c) {
     c->memory = calloc(total, sizeof *c->memory);
     c->links = calloc(n, sizeof *c->links);
     c->steps = calloc((size_t)c->tree->max_chain + 1, sizeof *c->steps);
+    if (c->tree->rounded && c->dynamics == SIMBODY_DYNAMICS_RECURSIVE) {
+        c->points = calloc(n, sizeof *c->points);
+        c->rounding = calloc(n, sizeof *c->rounding);
+        if (c->points == NULL || c->rounding == NULL) {
+            return MHE_E_MEMORY;
+        }
+    }
     if (c->memory == NULL || c->links == NULL || c->steps == NULL) {
         return MHE_E_MEMORY;
     }
@@ -141,6 +149,8 @@ void simbody_context_destroy(void *context) {
         skeleton_free(c->skeleton);
         free(c->links);
         free(c->steps);
+        free(c->points);
+        free(c->rounding);
         free(c->memory);
         free(c);
     }

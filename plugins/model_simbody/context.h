@@ -6,6 +6,7 @@
 #include "dynamics.h"
 #include "model.h"
 #include "path.h"
+#include "rounding.h"
 #include "skeleton.h"
 
 typedef struct simbody_model {
@@ -23,10 +24,13 @@ typedef struct simbody_context {
     skeleton *skeleton;
     link_motion *links; /* [n_joints] */
     path_step *steps;
-    double *memory;                                /* all below */
-    double *v;                                     /* [n_q] */
-    double *slopes;                                /* [n_joints x 4] */
+    link_points *points;     /* [n_joints]; NULL: the frames are, or count as, rotations */
+    link_rounding *rounding; /* likewise */
+    double *memory;          /* all below */
+    double *v;               /* [n_q] */
+    double *slopes;          /* [n_joints x 4] */
     double *angle, *speed, *acceleration, *torque; /* [n_joints] */
+    double *rounding_torque;                       /* [n_joints] */
     double *r, *p;                                 /* links' placement */
     double *joint_mass, *by_angle, *by_speed;      /* [n_joints x n_joints] */
     double *mass, *factor;                         /* [n_q x n_q] */

@@ -20,8 +20,7 @@
 
 static const double no_motion[6];
 
-/* f = I v */
-static void inertia_times(const rigid_inertia *inertia, const double *v, double *f) {
+void inertia_times(const rigid_inertia *inertia, const double *v, double *f) {
     double other[3];
     rotate3(inertia->second, v, f);
     cross3(inertia->first, v + 3, other);
@@ -82,20 +81,55 @@ void dynamics_axes(const tree *t, const double *r, const double *p, link_motion 
     }
 }
 
-void dynamics_inertias(const tree *t, const double *r, const double *p, link_motion *links) {
+/* out = r m r^T; bodies that only stand between two joints have no inertia. */
+static void turn_inertia(const double *r, const double *m, double *out) {
+    int any = 0;
+    for (int i = 0; i < 9; i++) {
+        any |= m[i] != 0;
+    }
+    if (any) {
+        congruence3(r, m, out);
+    } else {
+        memset(out, 0, 9 * sizeof *out);
+    }
+}
+
+static void add_diagonal(double *m, double value) {
+    for (int i = 0; i < 9; i += 4) {
+        m[i] += value;
+    }
+}
+
+static void own_inertia(const tree_joint *joint, const double *r, const double *p,
+                        rigid_inertia *own, link_points *apart) {
+    double com[3];
+    place3(r, p, joint->com, com);
+    own->mass = joint->mass;
+    for (int k = 0; k < 3; k++) {
+        own->first[k] = joint->mass * com[k];
+    }
+    if (apart == NULL) {
+        turn_inertia(r, joint->inertia, own->second);
+    } else {
+        double rest[9];
+        memcpy(rest, joint->inertia, sizeof rest);
+        add_diagonal(rest, -trace3(joint->points));
+        turn_inertia(r, rest, apart->rest);
+        turn_inertia(r, joint->points, apart->points);
+        memcpy(own->second, apart->rest, sizeof own->second);
+        add_diagonal(own->second, trace3(apart->points));
+    }
+    add_point_inertia(joint->mass, com, own->second);
+}
+
+void dynamics_inertias(const tree *t, const double *r, const double *p, link_motion *links,
+                       link_points *points) {
     for (int32_t i = 0; i < t->n_joints; i++) {
-        const tree_joint *joint = &t->joints[i];
         rigid_inertia *own = &links[i].own;
         memset(own, 0, sizeof *own);
-        if (joint->mass > 0) {
-            double com[3];
-            place3(r + 9 * i, p + 3 * i, joint->com, com);
-            own->mass = joint->mass;
-            for (int k = 0; k < 3; k++) {
-                own->first[k] = joint->mass * com[k];
-            }
-            congruence3(r + 9 * i, joint->inertia, own->second);
-            add_point_inertia(joint->mass, com, own->second);
+        if (t->joints[i].mass > 0) {
+            link_points *apart = points == NULL ? NULL : &points[i];
+            own_inertia(&t->joints[i], r + 9 * i, p + 3 * i, own, apart);
         }
         links[i].composite = *own;
     }

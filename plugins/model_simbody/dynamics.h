@@ -16,6 +16,15 @@ typedef struct rigid_inertia {
     double second[9];
 } rigid_inertia;
 
+/* f = I v */
+void inertia_times(const rigid_inertia *inertia, const double *v, double *f);
+
+/* A link's inertia about its centre of mass, in ground axes, as rest + trace(points) 1, `points` as
+ * in tree_joint: a frame that is not quite a rotation turns both by r . r^T. */
+typedef struct link_points {
+    double points[9], rest[9];
+} link_points;
+
 /* What is known of one link at the present state. Composite: of the link and all beyond it. */
 typedef struct link_motion {
     double axis[6];         /* motion of the link per unit of joint speed, S */
@@ -34,8 +43,10 @@ void dynamics_place(const tree *tree, const double *angle, double *r, double *p)
 /* Axes from the links' placement: r [n_joints x 9], p [n_joints x 3]. Needed by all below. */
 void dynamics_axes(const tree *tree, const double *r, const double *p, link_motion *links);
 
-/* Own and composite inertias. Needed by all below. */
-void dynamics_inertias(const tree *tree, const double *r, const double *p, link_motion *links);
+/* Own and composite inertias. Needed by all below. Sets points [n_joints] as well; NULL: the frames
+ * are rotations. */
+void dynamics_inertias(const tree *tree, const double *r, const double *p, link_motion *links,
+                       link_points *points);
 
 /* M [n_joints x n_joints] */
 void dynamics_mass(const tree *tree, const link_motion *links, double *mass);

@@ -59,7 +59,7 @@ static mhe_status context_mass(simbody_context *c, mhe_error *err) {
     if (c->has_mass) {
         return MHE_OK;
     }
-    dynamics_inertias(t, c->r, c->p, c->links);
+    dynamics_inertias(t, c->r, c->p, c->links, c->points);
     if (c->dynamics == SIMBODY_DYNAMICS_SIMBODY) {
         mhe_status status = skeleton_dynamics(c->skeleton, NULL, NULL, NULL, c->joint_mass, err);
         if (status != MHE_OK) {
@@ -94,6 +94,9 @@ static mhe_status context_torque(simbody_context *c, const double *vdot, mhe_err
         return skeleton_dynamics(c->skeleton, c->speed, c->acceleration, c->torque, NULL, err);
     }
     dynamics_inverse(t, c->speed, c->acceleration, c->links, c->torque);
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        c->torque[i] += c->rounding_torque[i];
+    }
     return MHE_OK;
 }
 
@@ -106,6 +109,10 @@ static mhe_status context_motion(simbody_context *c, mhe_error *err) {
         return status;
     }
     dynamics_velocities(c->tree, c->speed, c->links);
+    if (c->rounding != NULL) {
+        rounding_torque(c->tree, c->r, c->p, c->speed, c->links, c->points, c->rounding,
+                        c->rounding_torque);
+    }
     status = context_torque(c, NULL, err);
     to_coordinates(c, c->torque, c->bias);
     c->has_motion = status == MHE_OK;

@@ -157,6 +157,77 @@ static void rigid_bodies_move_as_their_point_masses(void **state) {
     }
 }
 
+/* The tangle without gravity and with frames that are rotations to about three digits only. */
+static const mhe_description *rounded_tangle(void) {
+    static mhe_body bodies[8];
+    static mhe_description d;
+    uint64_t seed = 5;
+    d = *test_tangle();
+    assert_true(d.n_bodies <= 8);
+    memcpy(bodies, d.bodies, sizeof *bodies * (size_t)d.n_bodies);
+    for (int32_t b = 0; b < d.n_bodies; b++) {
+        for (int i = 0; i < 9; i++) {
+            bodies[b].joint_r[i] += test_random(&seed, -1e-4, 1e-4);
+            bodies[b].body_r[i] += test_random(&seed, -1e-4, 1e-4);
+        }
+    }
+    d.bodies = bodies;
+    memset(d.gravity, 0, sizeof d.gravity);
+    return &d;
+}
+
+/* out = dM/dx by a fourth order difference along `way` */
+static void mass_rate(test_instance *t, const double *q, const double *way, double *out) {
+    static const double steps[] = {-2, -1, 1, 2}, factors[] = {1, -8, 8, -1};
+    double at[MAX_Q], none[MAX_Q] = {0}, mass[MAX_Q * MAX_Q], h = 1e-3;
+    memset(out, 0, sizeof mass);
+    for (int k = 0; k < 4; k++) {
+        mhe_kinematics kinematics = {.size = sizeof kinematics, .mass = mass};
+        for (int i = 0; i < t->n_q; i++) {
+            at[i] = q[i] + steps[k] * h * way[i];
+        }
+        assert_int_equal(t->ops->kinematics(t->context, at, none, &kinematics, NULL), MHE_OK);
+        for (int i = 0; i < t->n_q * t->n_q; i++) {
+            out[i] += factors[k] * mass[i] / (12 * h);
+        }
+    }
+}
+
+/* bias = dM/dt v - 1/2 d(v^T M v)/dq, whatever the frames are: the bias neither makes nor loses
+ * energy. */
+static void bias_is_that_of_the_mass_matrix(void **state) {
+    (void)state;
+    test_instance t;
+    uint64_t seed = 6;
+    test_open(&t, rounded_tangle(), SIMBODY_DYNAMICS_RECURSIVE);
+    for (int s = 0; s < 20; s++) {
+        double q[MAX_Q], v[MAX_Q], bias[MAX_Q], expected[MAX_Q] = {0}, rate[MAX_Q * MAX_Q];
+        test_tangle_state(&seed, q, v);
+        /* between the knots of its spline, where the third derivative jumps */
+        q[2] = (double[]){-0.8, 0.1, 0.9}[s % 3];
+        for (int c = -1; c < t.n_q; c++) {
+            double way[MAX_Q] = {0}, energy = 0;
+            if (c >= 0) {
+                way[c] = 1;
+            }
+            mass_rate(&t, q, c < 0 ? v : way, rate);
+            for (int i = 0; i < t.n_q; i++) {
+                for (int j = 0; j < t.n_q; j++) {
+                    expected[i] += c < 0 ? rate[i * t.n_q + j] * v[j] : 0;
+                    energy += 0.5 * v[i] * rate[i * t.n_q + j] * v[j];
+                }
+            }
+            if (c >= 0) {
+                expected[c] -= energy;
+            }
+        }
+        mhe_kinematics out = {.size = sizeof out, .bias = bias};
+        assert_int_equal(t.ops->kinematics(t.context, q, v, &out, NULL), MHE_OK);
+        assert_close("bias", bias, expected, t.n_q, 1e-8);
+    }
+    test_close(&t);
+}
+
 /* Both ways to the same numbers, and forward dynamics as the inverse of inverse dynamics. */
 static void recursion_and_simbody_agree(void **state) {
     (void)state;
@@ -202,6 +273,7 @@ int main(void) {
         cmocka_unit_test(pendulum_has_its_closed_form),
         cmocka_unit_test(points_are_where_the_description_says),
         cmocka_unit_test(rigid_bodies_move_as_their_point_masses),
+        cmocka_unit_test(bias_is_that_of_the_mass_matrix),
         cmocka_unit_test(recursion_and_simbody_agree),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -176,6 +176,21 @@ static void wrong_descriptions_are_refused(void **state) {
 }
 
 /* As in a shoulder model of biobuddy: one frame swaps two axes, the next swaps them back. */
+static void frames_with_few_digits_are_noticed(void **state) {
+    (void)state;
+    chain c;
+    tree *t = NULL;
+    make_chain(&c);
+    c.bodies[2].body_r[1] = 1e-9; /* within the last link, which turns as a whole */
+    assert_int_equal(tree_create(&c.d, &t, NULL), MHE_OK);
+    assert_int_equal(t->rounded, 0);
+    tree_free(t);
+    c.bodies[1].body_r[1] = 1e-9; /* carries the last link's joint */
+    assert_int_equal(tree_create(&c.d, &t, NULL), MHE_OK);
+    assert_int_equal(t->rounded, 1);
+    tree_free(t);
+}
+
 static void mirrored_frames_that_cancel_are_allowed(void **state) {
     (void)state;
     chain c;
@@ -194,6 +209,7 @@ int main(void) {
         cmocka_unit_test(only_segments_between_links_remain),
         cmocka_unit_test(functions_and_their_derivatives),
         cmocka_unit_test(wrong_descriptions_are_refused),
+        cmocka_unit_test(frames_with_few_digits_are_noticed),
         cmocka_unit_test(mirrored_frames_that_cancel_are_allowed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -8,6 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Frames of a file with all digits, multiplied, are rotations to less than this. */
+#define ROUNDING 1e-13
+
 /* Where a frame is fixed: to which link, and how. */
 typedef struct placement {
     int32_t link;
@@ -154,6 +157,7 @@ static void tree_add_mass(tree *t, const mhe_body *body, const placement *at) {
         link->inertia[i] += inertia[i];
     }
     add_point_inertia(link->mass * body->mass / total, apart, link->inertia);
+    add_outer3(link->points, link->mass * body->mass / total, apart, apart);
     link->mass = total;
 }
 
@@ -254,6 +258,9 @@ static void tree_build(const mhe_description *d, tree *t, placement *places) {
     }
     for (int32_t i = 0; i < d->n_markers; i++) {
         t->markers[i] = tree_point_at(places, d->markers[i].body, d->markers[i].location);
+    }
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        t->rounded |= off_orthogonal3(t->joints[i].r) > ROUNDING;
     }
     int32_t *chain = t->chains;
     for (int32_t i = 0; i < d->n_muscles; i++) {

@@ -21,6 +21,7 @@ typedef struct tree_joint {
     double r[9], p[3];            /* joint frame in the parent link */
     double mass, com[3];          /* of the moved link, in its own frame */
     double inertia[9];            /* about its centre of mass */
+    double points[9];             /* sum m d d^T, its bodies at d from there; part of inertia */
 } tree_joint;
 
 typedef struct tree_point {
@@ -41,6 +42,7 @@ typedef struct tree_segment {
 typedef struct tree {
     int32_t n_q, n_joints, n_markers, n_muscles, n_points, n_segments;
     double gravity[3];
+    int32_t rounded; /* a joint's frame is a rotation to the digits of a file only */
     tree_joint *joints;
     tree_point *markers;  /* [n_markers] */
     tree_point *points;   /* of the paths */

@@ -17,15 +17,7 @@ static int all_finite(const double *values, int32_t n) {
 /* Columns of unit length at right angles. A mirrored frame passes: files do hold pairs of them that
  * undo each other; what is left at the joints is checked after the reduction. */
 static int is_orthogonal(const double *r) {
-    double product[9];
-    static const double unit[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-    congruence3(r, unit, product);
-    for (int i = 0; i < 9; i++) {
-        if (!(fabs(product[i] - unit[i]) < 1e-3)) { /* files round to as few as four digits */
-            return 0;
-        }
-    }
-    return 1;
+    return off_orthogonal3(r) < 1e-3; /* files round to as few as four digits */
 }
 
 static mhe_status check_motion(const mhe_motion *motion, int32_t n_coordinates, const char *body,

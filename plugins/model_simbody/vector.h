@@ -5,6 +5,8 @@
 #ifndef SIMBODY_VECTOR_H
 #define SIMBODY_VECTOR_H
 
+#include <math.h>
+
 static inline double dot3(const double *a, const double *b) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -54,6 +56,19 @@ static inline void congruence3(const double *r, const double *m, double *out) {
     }
 }
 
+static inline void add3(double *a, double scale, const double *b) {
+    for (int i = 0; i < 3; i++) {
+        a[i] += scale * b[i];
+    }
+}
+
+/* m += scale a b^T */
+static inline void add_outer3(double *m, double scale, const double *a, const double *b) {
+    for (int i = 0; i < 3; i++) {
+        add3(m + 3 * i, scale * a[i], b);
+    }
+}
+
 /* out += mass (|d|^2 1 - d d^T): what `mass` at `d` adds to an inertia */
 static inline void add_point_inertia(double mass, const double *d, double *out) {
     double square = dot3(d, d);
@@ -62,6 +77,25 @@ static inline void add_point_inertia(double mass, const double *d, double *out) 
             out[3 * i + j] += mass * ((i == j ? square : 0.0) - d[i] * d[j]);
         }
     }
+}
+
+static inline double trace3(const double *m) {
+    return m[0] + m[4] + m[8];
+}
+
+/* Largest entry of r r^T - 1; NaN when r has one. */
+static inline double off_orthogonal3(const double *r) {
+    double worst = 0;
+    for (int i = 0; i < 3; i++) {
+        for (int j = i; j < 3; j++) {
+            double off = fabs(dot3(r + 3 * i, r + 3 * j) - (i == j));
+            if (isnan(off)) {
+                return off;
+            }
+            worst = fmax(worst, off);
+        }
+    }
+    return worst;
 }
 
 static inline double dot6(const double *a, const double *b) {
