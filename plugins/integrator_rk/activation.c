@@ -15,6 +15,8 @@
  * nearly linear in activation, the impulses of the transient are then right. */
 #include "rk.h"
 
+#include "../clones.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -24,9 +26,11 @@
  * order of its square, and the derivatives belong to values that are off by no more. */
 #define RK_ACTIVATION_TOLERANCE 1e-6
 #define RK_ACTIVATION_ITERATIONS 12
+/* More steps than this in a mechanical one mean a state far out. */
+#define RK_ACTIVATION_STEPS 1000
 
-typedef double rk_matrix[STAGES][STAGES][LANES];
-typedef double rk_vector[STAGES][LANES];
+/* LANES muscles; arithmetic on it is theirs, one by one. */
+typedef double rk_lanes __attribute__((vector_size(LANES * sizeof(double))));
 
 /* sum += weight * from [n]. */
 static inline void rk_add(double *restrict sum, double weight, const double *restrict from,
@@ -36,140 +40,115 @@ static inline void rk_add(double *restrict sum, double weight, const double *res
     }
 }
 
-/* out -= a * b, lane by lane. */
-static inline void rk_lanes_subtract(double out[LANES], const double a[LANES],
-                                     const double b[LANES]) {
-    for (int l = 0; l < LANES; l++) {
-        out[l] -= a[l] * b[l];
-    }
-}
+#define RK_LOAD(lanes, from) memcpy(&(lanes), (from), sizeof(rk_lanes))
+#define RK_STORE(to, lanes) memcpy((to), &(lanes), sizeof(rk_lanes))
 
-/* LU (unit lower, reciprocals on the diagonal) of the systems of the muscles i .. i + LANES - 1 at
- * their present stage values. */
-static inline void rk_lanes_factor(const struct rk_context *c, int32_t i, double h, rk_matrix m) {
-    const double *A = c->rk->activation.A;
+/* m = LU (unit lower, reciprocals on the diagonal) of the systems at the slopes g_a [4], one a
+ * stage. */
+static inline __attribute__((always_inline)) void
+rk_lanes_factor(const double *A, double h, const rk_lanes *g_a, rk_lanes m[STAGES][STAGES]) {
     for (int j = 0; j < STAGES; j++) {
-        const double *g_a = c->slope_a + j * c->rk->pad + i;
         for (int k = 0; k < STAGES; k++) {
-            double one = j == k ? 1.0 : 0.0, by = h * A[j * STAGES + k];
-            for (int l = 0; l < LANES; l++) {
-                m[j][k][l] = one - by * g_a[l];
-            }
+            m[j][k] = (j == k ? 1.0 : 0.0) - (h * A[j * STAGES + k]) * g_a[j];
         }
     }
     for (int k = 0; k < STAGES; k++) {
-        for (int l = 0; l < LANES; l++) {
-            m[k][k][l] = 1 / m[k][k][l];
-        }
+        m[k][k] = 1.0 / m[k][k];
         for (int j = k + 1; j < STAGES; j++) {
-            for (int l = 0; l < LANES; l++) {
-                m[j][k][l] *= m[k][k][l];
-            }
+            m[j][k] *= m[k][k];
             for (int n = k + 1; n < STAGES; n++) {
-                rk_lanes_subtract(m[j][n], m[j][k], m[k][n]);
+                m[j][n] -= m[j][k] * m[k][n];
             }
         }
     }
 }
 
-static inline void rk_lanes_solve(rk_matrix m, rk_vector x) {
+static inline __attribute__((always_inline)) void rk_lanes_solve(rk_lanes m[STAGES][STAGES],
+                                                                 rk_lanes *x) {
     for (int i = 1; i < STAGES; i++) {
         for (int j = 0; j < i; j++) {
-            rk_lanes_subtract(x[i], m[i][j], x[j]);
+            x[i] -= m[i][j] * x[j];
         }
     }
     for (int i = STAGES - 1; i >= 0; i--) {
         for (int j = i + 1; j < STAGES; j++) {
-            rk_lanes_subtract(x[i], m[i][j], x[j]);
+            x[i] -= m[i][j] * x[j];
         }
-        for (int l = 0; l < LANES; l++) {
-            x[i][l] *= m[i][i][l];
-        }
+        x[i] *= m[i][i];
     }
 }
 
-/* One Newton correction of all muscles; returns the largest, NaN if one is. About the stage values
+/* One Newton correction of all muscles; returns its norm, NaN if one is. About the stage values
  * y the slopes are k = g + g_a (a + h A k - y), so M k = g + g_a (a - y), and the new values a + h
  * A k. */
-static double rk_activation_correct(struct rk_context *c, double h) {
-    const struct rk_tableau *t = &c->rk->activation;
+CLONES static double rk_activation_correct(struct rk_context *c, double h) {
+    const double *A = c->rk->activation.A;
     int32_t pad = c->rk->pad;
-    double largest[LANES] = {0}, finite = 0, most = 0;
+    rk_lanes squares = {0};
+    double sum_of_squares = 0;
     for (int32_t i = 0; i < pad; i += LANES) {
-        rk_matrix m;
-        rk_vector k_new;
-        rk_lanes_factor(c, i, h, m);
+        rk_lanes m[STAGES][STAGES], g_a[STAGES], k_new[STAGES], y[STAGES], a;
+        RK_LOAD(a, c->a + i);
         for (int j = 0; j < STAGES; j++) {
-            for (int l = 0; l < LANES; l++) {
-                int32_t at = j * pad + i + l;
-                k_new[j][l] = c->slope[at] + c->slope_a[at] * (c->a[i + l] - c->guess[at]);
-            }
+            RK_LOAD(g_a[j], c->slope_a + j * pad + i);
+            RK_LOAD(k_new[j], c->slope + j * pad + i);
+            RK_LOAD(y[j], c->guess + j * pad + i);
+            k_new[j] += g_a[j] * (a - y[j]);
         }
+        rk_lanes_factor(A, h, g_a, m);
         rk_lanes_solve(m, k_new);
         for (int j = 0; j < STAGES; j++) {
-            double y[LANES];
-            memcpy(y, c->a + i, sizeof y);
-            for (int k = 0; k < STAGES; k++) {
-                rk_add(y, h * t->A[j * STAGES + k], k_new[k], LANES);
+            rk_lanes sum = A[j * STAGES] * k_new[0];
+            for (int k = 1; k < STAGES; k++) {
+                sum += A[j * STAGES + k] * k_new[k];
             }
-            for (int l = 0; l < LANES; l++) {
-                double move = fabs(y[l] - c->guess[j * pad + i + l]);
-                largest[l] = move > largest[l] ? move : largest[l];
-                finite += move - move;
-            }
-            memcpy(c->guess + j * pad + i, y, sizeof y);
-            memcpy(c->slope + j * pad + i, k_new[j], sizeof k_new[j]);
+            sum = a + h * sum;
+            squares += (sum - y[j]) * (sum - y[j]);
+            RK_STORE(c->guess + j * pad + i, sum);
+            RK_STORE(c->slope + j * pad + i, k_new[j]);
         }
     }
     for (int l = 0; l < LANES; l++) {
-        most = fmax(most, largest[l]);
+        sum_of_squares += squares[l];
     }
-    return finite == 0 ? most : NAN;
+    return sqrt(sum_of_squares);
 }
 
 /* Derivatives of the stage slopes k by the start of the step and by e, M^-1 g_a and M^-1 g_e: those
  * of the stage values go to `trace`; chained onto those of the start, the stage values' are guess_a
  * and guess_e, the end's a_a and a_e. */
-static void rk_activation_chain(struct rk_context *c, double h, const struct rk_trace *trace) {
+CLONES static void rk_activation_chain(struct rk_context *c, double h,
+                                       const struct rk_trace *trace) {
     const struct rk_tableau *t = &c->rk->activation;
     int32_t pad = c->rk->pad;
     for (int32_t i = 0; i < pad; i += LANES) {
-        rk_matrix m;
-        rk_vector k_a, k_e;
-        double *a_a = c->a_a + i, *a_e = c->a_e + i, by_a[LANES], by_e[LANES];
-        rk_lanes_factor(c, i, h, m);
+        rk_lanes m[STAGES][STAGES], g_a[STAGES], k_a[STAGES], k_e[STAGES], a_a, a_e, by_a, by_e;
+        RK_LOAD(a_a, c->a_a + i);
+        RK_LOAD(a_e, c->a_e + i);
         for (int j = 0; j < STAGES; j++) {
-            for (int l = 0; l < LANES; l++) {
-                k_a[j][l] = h * c->slope_a[j * pad + i + l];
-                k_e[j][l] = h * c->slope_e[j * pad + i + l];
-            }
+            RK_LOAD(g_a[j], c->slope_a + j * pad + i);
+            RK_LOAD(k_e[j], c->slope_e + j * pad + i);
+            k_a[j] = h * g_a[j];
+            k_e[j] *= h;
         }
+        rk_lanes_factor(t->A, h, g_a, m);
         rk_lanes_solve(m, k_a);
         rk_lanes_solve(m, k_e);
         for (int j = 0; j <= STAGES; j++) { /* the last: the end of the step */
             const double *weight = j < STAGES ? t->A + j * STAGES : t->b;
-            for (int l = 0; l < LANES; l++) {
-                by_a[l] = 1;
-                by_e[l] = 0;
+            by_a = 1.0 + weight[0] * k_a[0];
+            by_e = weight[0] * k_e[0];
+            for (int k = 1; k < STAGES; k++) {
+                by_a += weight[k] * k_a[k];
+                by_e += weight[k] * k_e[k];
             }
-            for (int k = 0; k < STAGES; k++) {
-                rk_add(by_a, weight[k], k_a[k], LANES);
-                rk_add(by_e, weight[k], k_e[k], LANES);
+            rk_lanes chained_a = by_a * a_a, chained_e = by_a * a_e + by_e;
+            if (j < STAGES) {
+                RK_STORE(trace->by_a + j * pad + i, by_a);
+                RK_STORE(trace->by_e + j * pad + i, by_e);
             }
-            if (j == STAGES) {
-                break;
-            }
-            int32_t at = j * pad + i;
-            memcpy(trace->by_a + at, by_a, sizeof by_a);
-            memcpy(trace->by_e + at, by_e, sizeof by_e);
-            for (int l = 0; l < LANES; l++) {
-                c->guess_a[at + l] = by_a[l] * a_a[l];
-                c->guess_e[at + l] = by_a[l] * a_e[l] + by_e[l];
-            }
-        }
-        for (int l = 0; l < LANES; l++) {
-            a_a[l] *= by_a[l];
-            a_e[l] = by_a[l] * a_e[l] + by_e[l];
+            RK_STORE(j < STAGES ? c->guess_a + j * pad + i : c->a_a + i, chained_a);
+            RK_STORE(j < STAGES ? c->guess_e + j * pad + i : c->a_e + i, chained_e);
         }
     }
 }
@@ -324,21 +303,43 @@ static void rk_activation_project(struct rk_context *c, int32_t k, int32_t n, in
     }
 }
 
+/* Steps that the activations need over h: as their time constants at its start say. */
+static mhe_status rk_activation_count(struct rk_context *c, const double *e, double h, int32_t *n,
+                                      mhe_error *err) {
+    const mhe_system *system = c->rk->system;
+    double fastest = 0, sum = 0;
+    mhe_status status =
+        system->activation_rate(system, e, c->a, c->slope, c->slope_e, c->slope_a, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    for (int32_t i = 0; i < system->n_m; i++) {
+        double rate = fabs(c->slope_a[i]);
+        fastest = rate > fastest ? rate : fastest;
+        sum += rate; /* NaN if one is */
+    }
+    double steps = ceil(h * fastest / c->rk->config.activation_step - 1e-9);
+    if (!(sum + steps < INFINITY) || steps > RK_ACTIVATION_STEPS) {
+        return mhe_fail(err, MHE_RETRY, "activations: no solution over %g s", h);
+    }
+    *n = steps > 1 ? (int32_t)steps : 1;
+    return MHE_OK;
+}
+
 mhe_status rk_activations(struct rk_context *c, const double *e, double h, int32_t derivatives,
                           mhe_error *err) {
-    int32_t n_m = c->rk->system->n_m;
-    int32_t n = (int32_t)ceil(h / c->rk->activation_step - 1e-9);
+    int32_t n_m = c->rk->system->n_m, n = 0;
+    mhe_status status = rk_activation_count(c, e, h, &n, err);
     size_t bytes = sizeof(double) * (size_t)(c->rk->mechanics.stages * n_m);
     memcpy(c->a_start, c->a, sizeof(double) * (size_t)n_m);
     memset(c->stage_a, 0, bytes);
     memset(c->stage_a_a, 0, bytes);
     memset(c->stage_a_e, 0, bytes);
-    for (int32_t k = 0; k < n; k++) {
-        mhe_status status = rk_activation_step(c, e, k, h / n, derivatives, err);
-        if (status != MHE_OK) {
-            return status;
+    for (int32_t k = 0; k < n && status == MHE_OK; k++) {
+        status = rk_activation_step(c, e, k, h / n, derivatives, err);
+        if (status == MHE_OK) {
+            rk_activation_project(c, k, n, derivatives);
         }
-        rk_activation_project(c, k, n, derivatives);
     }
-    return MHE_OK;
+    return status;
 }

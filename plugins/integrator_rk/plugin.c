@@ -13,6 +13,9 @@ static const mhe_option rk_options[] = {
                  "Error left in the stage velocities, relative to 1 + |qdot|."),
     MHE_OPT_INT(struct rk_config, max_newton, 20, 1, 1000, "1",
                 "Newton iterations before a step is halved."),
+    MHE_OPT_REAL(struct rk_config, activation_step, 1.7, 0.01, 10, "1",
+                 "Longest step of the activations, in their shortest time constant where it "
+                 "starts."),
 };
 
 static const mhe_plugin rk_plugin = {

@@ -6,37 +6,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Steps of the activations are at most this many of their shortest time constants long: the 4-stage
- * scheme is then off by less than 1e-6 of e - a. */
-#define RK_ACTIVATION_STEP 1.7
 /* An interval whose steps have no solution is tried again with steps of half the length, this
  * often. */
 #define RK_HALVINGS 3
-
-/* Longest step of the activations from their rates at the corners of [0, 1]^2. */
-static mhe_status rk_activation_limit(struct rk *rk, mhe_error *err) {
-    const mhe_system *system = rk->system;
-    size_t n = (size_t)system->n_m;
-    double *memory = calloc(5 * n + 1, sizeof *memory), fastest = 1e-3;
-    if (memory == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
-    }
-    double *e = memory, *a = e + n, *rate = a + n, *rate_e = rate + n, *rate_a = rate_e + n;
-    mhe_status status = MHE_OK;
-    for (int corner = 0; corner < 4 && status == MHE_OK; corner++) {
-        for (size_t i = 0; i < n; i++) {
-            e[i] = corner & 1;
-            a[i] = corner >> 1;
-        }
-        status = system->activation_rate(system, e, a, rate, rate_e, rate_a, err);
-        for (size_t i = 0; i < n && status == MHE_OK; i++) {
-            fastest = fmax(fastest, fabs(rate_a[i]));
-        }
-    }
-    rk->activation_step = RK_ACTIVATION_STEP / fastest;
-    free(memory);
-    return status;
-}
 
 static void rk_destroy(void *self) {
     free(self);
@@ -57,11 +29,6 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
         rk_tableau_rk4(&rk->mechanics);
     } else {
         rk_tableau_gauss(rk->config.stages, &rk->mechanics);
-    }
-    mhe_status status = system->n_a > 0 ? rk_activation_limit(rk, err) : MHE_OK;
-    if (status != MHE_OK) {
-        rk_destroy(rk);
-        return status;
     }
     rk_memory_layout(rk);
     *self = rk;

@@ -26,6 +26,7 @@ struct rk_config {
     double max_step;
     double newton_tolerance;
     int32_t max_newton;
+    double activation_step; /* in their shortest time constants */
 };
 
 /* Row-major, `stages` wide. Stage times c do not decrease. */
@@ -46,8 +47,7 @@ struct rk {
     const mhe_system *system;
     struct rk_config config;
     struct rk_tableau mechanics, activation;
-    double activation_step; /* longest step of the activations, s */
-    int32_t pad;            /* n_m in whole lanes */
+    int32_t pad; /* n_m in whole lanes */
     /* memory of an interval: steps, steps of the activations in one of them, doubles of a step */
     int32_t memory_steps, memory_traces, memory_stride;
 };
