@@ -51,6 +51,12 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
     if (status == MHE_OK) {
         status = check_placement(model->tree, err);
     }
+    if (status == MHE_OK) {
+        model->bundles = path_bundles(model->tree, &model->n_bundles);
+        if (model->bundles == NULL) {
+            status = mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
+        }
+    }
     if (status != MHE_OK) {
         simbody_destroy(model);
         return status;
@@ -62,6 +68,7 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
 void simbody_destroy(void *self) {
     simbody_model *model = self;
     if (model != NULL) {
+        free(model->bundles);
         tree_free(model->tree);
         free(model);
     }
@@ -123,6 +130,8 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
         return mhe_fail(err, MHE_E_MEMORY, "no memory for a context");
     }
     c->tree = model->tree;
+    c->bundles = model->bundles;
+    c->n_bundles = model->n_bundles;
     c->dynamics = model->dynamics;
     mhe_status status = context_allocate(c);
     if (status != MHE_OK) {

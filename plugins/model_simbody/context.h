@@ -11,11 +11,15 @@
 
 typedef struct simbody_model {
     tree *tree;
+    path_bundle *bundles;
+    int32_t n_bundles;
     int32_t dynamics; /* SIMBODY_DYNAMICS_* */
 } simbody_model;
 
 typedef struct simbody_context {
     const tree *tree;
+    const path_bundle *bundles; /* [n_bundles] the model's */
+    int32_t n_bundles;
     int32_t dynamics;
     int32_t placed;     /* a state was set */
     int32_t has_mass;   /* inertias and mass matrices are those of the state */

@@ -159,8 +159,8 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
     path_pose pose = {.r = c->r, .p = c->p, .slopes = c->slopes};
     if (out->length != NULL || out->length_q != NULL || out->length_qq != NULL) {
         int scratch = out->length_qq != NULL && out->length_q == NULL;
-        path_lengths(t, &pose, c->steps, out->length, scratch ? c->length_q : out->length_q,
-                     out->length_qq);
+        path_lengths(t, c->bundles, c->n_bundles, &pose, c->steps, out->length,
+                     scratch ? c->length_q : out->length_q, out->length_qq);
     }
     if (out->marker != NULL || out->marker_q != NULL) {
         path_markers(t, &pose, out->marker, out->marker_q);

@@ -5,12 +5,15 @@
  * a pin i also turns the changes by all joints j outside it (and its own): d2p/didj = z_i x dp/dj;
  * a slider turns nothing. With d = to - from, u = d / |d| and d_i = dd/di: l_i = u . d_i,   l_ij =
  * (d_i . d_j - l_i l_j) / l + u . d_ij, where u . (z_i x d_j) = (u x z_i) . d_j. Joint functions
- * f(q) bring f' to each d_i and f'' to the diagonal. */
+ * f(q) bring f' to each d_i and f'' to the diagonal. With 1 / l taken as 0 where the ends
+ * coincide, all derivatives are 0 there. */
 #include "path.h"
 
+#include "../clones.h"
 #include "vector.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define COINCIDENT 1e-9 /* m: below this a segment has no direction */
@@ -71,52 +74,165 @@ void path_markers(const tree *t, const path_pose *pose, double *position, double
     }
 }
 
-/* Steps of one segment, and its share in dL/dq (and the f'' terms of d2L/dq2). */
-static void segment_slopes(const tree *t, const path_pose *pose, const tree_segment *segment,
-                           const double *to, const double *from, const double *u, double length,
-                           path_step *steps, double *row_q, double *row_qq) {
+/* ---- bundles ---- */
+
+static int32_t segment_link(const tree *t, const tree_segment *segment, int to) {
+    return t->points[to ? segment->to : segment->from].link;
+}
+
+/* Puts the segment into a lane. */
+static void bundle_add(const tree *t, const tree_segment *segment, path_bundle *bundle, int lane) {
+    for (int k = 0; k < 3; k++) {
+        bundle->to[k][lane] = t->points[segment->to].at[k];
+        bundle->from[k][lane] = t->points[segment->from].at[k];
+    }
+    bundle->muscle[lane] = segment->muscle;
+}
+
+path_bundle *path_bundles(const tree *t, int32_t *n) {
+    path_bundle *bundles = calloc((size_t)t->n_segments + 1, sizeof *bundles);
+    *n = 0;
+    for (int32_t s = 0; s < t->n_segments && bundles != NULL; s++) {
+        const tree_segment *segment = &t->segments[s];
+        int32_t to = segment_link(t, segment, 1), from = segment_link(t, segment, 0), i = 0;
+        while (i < *n && (bundles[i].count == PATH_LANES || bundles[i].link_to != to ||
+                          bundles[i].link_from != from)) {
+            i++;
+        }
+        path_bundle *bundle = &bundles[i];
+        if (i == *n) {
+            *n += 1;
+            bundle->segment = segment;
+            bundle->link_to = to;
+            bundle->link_from = from;
+            for (int lane = 1; lane < PATH_LANES; lane++) {
+                bundle_add(t, segment, bundle, lane);
+            }
+        }
+        bundle_add(t, segment, bundle, bundle->count++);
+    }
+    return bundles;
+}
+
+/* ---- lengths ---- */
+
+#define INLINED static inline __attribute__((always_inline))
+
+/* (functions that took or gave vectors by value would have another calling convention with AVX) */
+#define LANES_DOT3(a, b) ((a)[0] * (b)[0] + (a)[1] * (b)[1] + (a)[2] * (b)[2])
+
+INLINED void lanes_place(const path_pose *pose, int32_t link, const path_lanes *at,
+                         path_lanes *out) {
+    const double *r = pose->r + 9 * (link < 0 ? 0 : link), *p = pose->p + 3 * (link < 0 ? 0 : link);
+    for (int k = 0; k < 3; k++) {
+        out[k] = at[k];
+        if (link >= 0) {
+            out[k] = p[k] + (r[3 * k] * at[0] + r[3 * k + 1] * at[1] + r[3 * k + 2] * at[2]);
+        }
+    }
+}
+
+/* Adds the lanes to entry `at` of their muscles' blocks of `stride`. */
+INLINED void lanes_scatter(const path_bundle *bundle, const path_lanes *lanes, int32_t stride,
+                           int32_t at, double *out) {
+    for (int lane = 0; lane < bundle->count; lane++) {
+        out[(size_t)bundle->muscle[lane] * (size_t)stride + (size_t)at] += (*lanes)[lane];
+    }
+}
+
+/* Steps of a bundle, and its share in dL/dq (and the f'' terms of d2L/dq2). */
+INLINED void bundle_slopes(const tree *t, const path_pose *pose, const path_bundle *bundle,
+                           const path_lanes *to, const path_lanes *from, const path_lanes *u,
+                           const path_lanes *inverse, path_step *steps, double *length_q,
+                           double *length_qq) {
+    const tree_segment *segment = bundle->segment;
+    const path_lanes none = {0};
     for (int32_t k = 0; k < segment->n_to + segment->n_from; k++) {
         path_step *step = &steps[k];
         int32_t joint = segment->joints[k];
-        const double *f = pose->slopes + 4 * joint;
-        double axis[3], change[3];
+        const double *f = pose->slopes + 4 * joint, *o = pose->p + 3 * joint;
+        double axis[3];
+        int rotation = joint_axis(t, pose, joint, axis);
+        const path_lanes *end = k < segment->n_to ? to : from;
+        double sign = k < segment->n_to ? 1 : -1;
+        path_lanes change[3];
+        for (int i = 0; i < 3; i++) {
+            int next = (i + 1) % 3, last = (i + 2) % 3;
+            change[i] =
+                rotation ? axis[next] * (end[last] - o[last]) - axis[last] * (end[next] - o[next])
+                         : axis[i] + none;
+            step->bend[i] = (rotation ? f[1] : 0) * (u[next] * axis[last] - u[last] * axis[next]);
+        }
+        path_lanes along = sign * LANES_DOT3(u, change), slope = f[1] * along;
         step->side = k < segment->n_to;
         step->coordinate = t->joints[joint].coordinate;
-        int rotation = point_change(t, pose, joint, step->side ? to : from, axis, change);
-        double sign = step->side ? 1 : -1;
-        double along = sign * dot3(u, change);
-        row_q[step->coordinate] += f[1] * along;
-        if (row_qq == NULL) {
+        lanes_scatter(bundle, &slope, t->n_q, step->coordinate, length_q);
+        if (length_qq == NULL) {
             continue;
         }
-        row_qq[step->coordinate * (t->n_q + 1)] += f[2] * along;
-        cross3(u, axis, step->bend);
+        path_lanes second = f[2] * along;
+        if (f[2] != 0) {
+            lanes_scatter(bundle, &second, t->n_q * t->n_q, step->coordinate * (t->n_q + 1),
+                          length_qq);
+        }
         for (int i = 0; i < 3; i++) {
             step->arm[i] = sign * f[1] * change[i];
-            step->turn[i] = (step->arm[i] - f[1] * along * u[i]) / length;
-            step->bend[i] *= rotation ? f[1] : 0;
+            step->turn[i] = (step->arm[i] - slope * u[i]) * *inverse;
         }
     }
 }
 
-/* The other terms of d2L/dq2 of one segment: pairs of its steps. */
-static void segment_curvature(const path_step *steps, int32_t n, int32_t n_q, double *row_qq) {
+/* The other terms of d2L/dq2: pairs of steps. */
+INLINED void bundle_curvature(const path_bundle *bundle, const path_step *steps, int32_t n_q,
+                              double *length_qq) {
+    int32_t n = bundle->segment->n_to + bundle->segment->n_from;
     for (int32_t i = 0; i < n; i++) {
         for (int32_t j = i; j < n; j++) { /* on one side, i carries j */
-            double entry = dot3(steps[i].turn, steps[j].arm);
+            int32_t row = steps[i].coordinate, column = steps[j].coordinate;
+            path_lanes entry = LANES_DOT3(steps[i].turn, steps[j].arm);
             if (steps[i].side == steps[j].side) {
-                entry += dot3(steps[i].bend, steps[j].arm);
+                entry += LANES_DOT3(steps[i].bend, steps[j].arm);
             }
-            row_qq[steps[i].coordinate * n_q + steps[j].coordinate] += entry;
+            lanes_scatter(bundle, &entry, n_q * n_q, row * n_q + column, length_qq);
             if (i != j) {
-                row_qq[steps[j].coordinate * n_q + steps[i].coordinate] += entry;
+                lanes_scatter(bundle, &entry, n_q * n_q, column * n_q + row, length_qq);
             }
         }
     }
 }
 
-void path_lengths(const tree *t, const path_pose *pose, path_step *steps, double *length,
-                  double *length_q, double *length_qq) {
+CLONES static void bundle_lengths(const tree *t, const path_bundle *bundle, const path_pose *pose,
+                                  path_step *steps, double *length, double *length_q,
+                                  double *length_qq) {
+    path_lanes to[3], from[3], u[3], l, inverse;
+    lanes_place(pose, bundle->link_to, bundle->to, to);
+    lanes_place(pose, bundle->link_from, bundle->from, from);
+    for (int k = 0; k < 3; k++) {
+        u[k] = to[k] - from[k];
+    }
+    l = LANES_DOT3(u, u);
+    for (int lane = 0; lane < PATH_LANES; lane++) {
+        l[lane] = sqrt(l[lane]);
+        inverse[lane] = l[lane] < COINCIDENT ? 0 : 1 / l[lane];
+    }
+    if (length != NULL) {
+        lanes_scatter(bundle, &l, 1, 0, length);
+    }
+    if (length_q == NULL) {
+        return;
+    }
+    for (int k = 0; k < 3; k++) {
+        u[k] *= inverse;
+    }
+    bundle_slopes(t, pose, bundle, to, from, u, &inverse, steps, length_q, length_qq);
+    if (length_qq != NULL) {
+        bundle_curvature(bundle, steps, t->n_q, length_qq);
+    }
+}
+
+void path_lengths(const tree *t, const path_bundle *bundles, int32_t n_bundles,
+                  const path_pose *pose, path_step *steps, double *length, double *length_q,
+                  double *length_qq) {
     size_t n_q = (size_t)t->n_q, n_m = (size_t)t->n_muscles;
     if (length != NULL) {
         memcpy(length, t->fixed_length, sizeof *length * n_m);
@@ -127,29 +243,7 @@ void path_lengths(const tree *t, const path_pose *pose, path_step *steps, double
     if (length_qq != NULL) {
         memset(length_qq, 0, sizeof *length_qq * n_m * n_q * n_q);
     }
-    for (int32_t s = 0; s < t->n_segments; s++) {
-        const tree_segment *segment = &t->segments[s];
-        size_t m = (size_t)segment->muscle;
-        double to[3], from[3], u[3];
-        point_place(pose, &t->points[segment->to], to);
-        point_place(pose, &t->points[segment->from], from);
-        for (int k = 0; k < 3; k++) {
-            u[k] = to[k] - from[k];
-        }
-        double l = sqrt(dot3(u, u));
-        if (length != NULL) {
-            length[m] += l;
-        }
-        if (length_q == NULL || l < COINCIDENT) {
-            continue;
-        }
-        for (int k = 0; k < 3; k++) {
-            u[k] /= l;
-        }
-        double *row_qq = length_qq == NULL ? NULL : length_qq + m * n_q * n_q;
-        segment_slopes(t, pose, segment, to, from, u, l, steps, length_q + m * n_q, row_qq);
-        if (row_qq != NULL) {
-            segment_curvature(steps, segment->n_to + segment->n_from, t->n_q, row_qq);
-        }
+    for (int32_t i = 0; i < n_bundles; i++) {
+        bundle_lengths(t, &bundles[i], pose, steps, length, length_q, length_qq);
     }
 }
