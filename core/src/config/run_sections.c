@@ -32,9 +32,10 @@ static const mhe_option muscle_options[] = {
 };
 
 static const mhe_option data_options[] = {
-    MHE_OPT_PATH(mhi_data_section, markers, 0, "Measured markers, .trc."),
+    MHE_OPT_PATH(mhi_data_section, markers, 0, "Measured markers, .trc or .c3d."),
     MHE_OPT_PATH(mhi_data_section, emg, 0,
-                 "EMG, .sto or .mot: normalised, a column a muscle; or raw, a column an electrode, "
+                 "EMG, .sto, .mot or .c3d (analog): normalised, a column a muscle; or raw, a "
+                 "column an electrode, "
                  "with emg.channels."),
     MHE_OPT_PATH(mhi_data_section, reference, 0,
                  "Known motion to start from and to compare with, .sto."),

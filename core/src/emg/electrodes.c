@@ -3,6 +3,7 @@
 
 #include "base/text.h"
 #include "emg/envelope.h"
+#include "io/motion_file.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -296,7 +297,7 @@ static mhe_status read_mvc_file(const mhi_run *run, const mhe_description *model
     mhi_electrodes *e = NULL;
     mhe_status status = channels == NULL || ones == NULL
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_sto_read(run->emg.mvc_file, &table, err);
+                            : mhi_signals_read(run->emg.mvc_file, &table, err);
     if (status == MHE_OK) {
         for (int32_t i = 0; i < run->emg.n_channels; i++) {
             channels[i] = run->emg.channels[i];

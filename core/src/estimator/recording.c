@@ -2,6 +2,7 @@
 #include "estimator/recording.h"
 
 #include "estimator/columns.h"
+#include "io/motion_file.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -101,7 +102,7 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
                                const mhe_host *host, mhe_error *err) {
     static const mhi_naming naming = {"marker", {"%s"}, 1};
     mhi_table *table = NULL;
-    mhe_status status = mhi_trc_read(run->data.markers, &table, err);
+    mhe_status status = mhi_markers_read(run->data.markers, &table, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -178,7 +179,7 @@ static mhe_status read_emg(mhi_recording *r, const mhi_run *run, const mhe_descr
                            const mhe_host *host, mhe_error *err) {
     static const mhi_naming naming = {"muscle", {"e_%s", "%s", "%s.excitation"}, 1};
     mhi_table *table = NULL;
-    mhe_status status = mhi_sto_read(run->data.emg, &table, err);
+    mhe_status status = mhi_signals_read(run->data.emg, &table, err);
     if (status != MHE_OK) {
         return status;
     }
