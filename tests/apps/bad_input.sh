@@ -35,6 +35,19 @@ expect() {
     cp "$demo"/arm19.osim "$demo"/demo* .
 }
 
+# warn NAME 'TEXT IN A WARNING' [arguments]: it is said, and the run would go on
+warn() {
+    name=$1 text=$2
+    shift 2
+    [ $# -gt 0 ] || set -- demo.yaml
+    count=$((count + 1))
+    if ! "$run" --check "$@" > stdout.txt 2> stderr.txt || ! grep 'warning:' stderr.txt | grep -qF -- "$text"; then
+        echo "FAILED $name: no warning with '$text': $(cat stderr.txt)"
+        failed=$((failed + 1))
+    fi
+    cp "$demo"/arm19.osim "$demo"/demo* .
+}
+
 # edit FILE 'SED SCRIPT'
 edit() { sed -i "$2" "$1"; }
 
@@ -78,7 +91,9 @@ expect typing-slip "did you mean 'DELT'"
 edit demo_markers.trc '4s/\t\([A-Z][A-Za-z_]*\)/\t\1zzzzzzzzzzzz/g;4s/Timezzzzzzzzzzzz/Time/'
 expect no-marker-matches 'no column is a marker'
 edit demo_markers.trc '3s/mm/m/'
-expect wrong-unit 'within a metre'
+warn wrong-unit 'they are taken as mm'
+awk -F '\t' -v OFS='\t' 'NR > 6 {for (i = 3; i <= NF; i++) $i += 9000} 1' "$demo"/demo_markers.trc > demo_markers.trc
+expect another-place 'within a metre'
 edit demo_markers.trc '20s/^\([0-9]*\)\t[0-9.e-]*/\1\tnan/'
 expect nan-time 'demo_markers.trc:20'
 edit demo_markers.trc '20s/^\([0-9]*\)\t[0-9.e-]*/\1\t0/'
@@ -100,6 +115,38 @@ edit demo_emg.sto 's/endheader/endhead/'
 expect no-endheader 'demo_emg.sto'
 head -c 4000 /dev/urandom > demo_emg.sto
 expect random-bytes 'demo_emg.sto'
+awk -F '\t' -v OFS='\t' 'NR > 7 {$1 *= 1000} 1' "$demo"/demo_emg.sto > demo_emg.sto
+expect emg-in-ms 'are its times in ms instead of s?'
+expect emg-elsewhere 'no time in common' demo.yaml --set data.emg_offset=100
+head -c 3000 /dev/urandom > demo.c3d
+expect c3d-random-bytes 'demo.c3d' demo.yaml --set data.markers=demo.c3d
+
+# raw EMG: two seconds at 1000 Hz of two electrodes, in V
+raw() { # [expression of a and b for each row k]
+    awk "BEGIN {print \"endheader\\ntime\\tA\\tB\"; srand(1); for (k = 0; k < 3000; k++) {
+        a = b = 1e-4 * (rand() - 0.5); $1; print k / 1000 \"\\t\" a \"\\t\" b}}" > raw.sto
+    sed 's/emg: demo_emg.sto/emg: raw.sto/' "$demo"/demo.yaml > raw.yaml
+    cat >> raw.yaml <<'END'
+emg:
+  channels:
+    - {name: A, muscles: [BRA, BRD], mvc: 1e-4}
+    - {name: B, muscles: [Deltoid1], mvc: 1e-4}
+END
+}
+raw 'a *= 1000'
+expect emg-in-mv 'are EMG and MVC in the same unit' raw.yaml
+raw 'a /= 1e4; b /= 1e4'
+expect emg-in-kv 'no channel reaches 1 % of its MVC' raw.yaml
+raw ''
+expect channel-slip "no column for the channel 'AA'" raw.yaml --set emg.channels.0.name=AA
+expect channel-muscle "did you mean 'BRA'" raw.yaml --set emg.channels.0.muscles=BRAA
+expect band-too-high 'half of the rate' raw.yaml --set emg.band_high=600
+raw 'if (b > 2e-5) b = 2e-5'
+warn emg-saturated '(amplifier saturated?): B (' raw.yaml
+raw 'a = 0'
+warn emg-flat '(electrode off?) are not tracked there: A (100 %)' raw.yaml
+raw 'if (k < 1000) b = "nan"'
+warn emg-late 'not tracked there: B (33.3 %)' raw.yaml
 edit demo_reference.sto 's/q_Arm_RotX/q_Leg/'
 expect reference-columns 'demo_reference.sto'
 want=1

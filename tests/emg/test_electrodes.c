@@ -119,7 +119,7 @@ static void times_are_aligned(void **state) {
     }
     mhi_table_free(table);
     rig.run.data.emg_offset = 1000;
-    check_refused(&rig, MHE_E_INPUT, "no time in common (data.emg_offset moves the EMG)");
+    check_refused(&rig, MHE_E_INPUT, "is no time in common (data.emg_offset moves the EMG)");
     rig_close(&rig);
 }
 
@@ -220,6 +220,10 @@ static void times_in_ms_are_named(void **state) {
         table->time[k] *= 1000;
     }
     table->rate = RIG_RATE / 1000;
+    assert_int_equal(rig_read(&rig, table, FRAMES, emg), MHE_E_INPUT);
+    assert_non_null(strstr(rig.err.text, "are its times in ms instead of s?"));
+    /* a recording so short that it could be s */
+    table->n_rows = 40;
     assert_int_equal(rig_read(&rig, table, FRAMES, emg), MHE_E_INPUT);
     assert_non_null(strstr(rig.err.text, "raw.sto: a band-pass from 20 to 450 Hz"));
     assert_non_null(strstr(rig.err.text, "(are its times in ms instead of s?)"));

@@ -159,10 +159,22 @@ static void reference_file(void **state) {
     mhi_table_free(t);
 }
 
+static void times_in_ms(void **state) {
+    (void)state;
+    mhi_table *t = read_text(FIRST KEYS VALUES LABELS XYZ "1\t0\t1\t2\t3\t4\t5\t6\n"
+                                                          "2\t10\t7\t8\t9\t10\t11\t12\n");
+    assert_near(t->time[1], 0.01, 1e-15);
+    assert_near(t->rate, 100, 0);
+    assert_int_equal(t->n_warnings, 1);
+    assert_non_null(strstr(t->warnings[0], "they are taken as ms"));
+    mhi_table_free(t);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(accepted_variations),
                                        cmocka_unit_test(repaired_with_a_warning),
                                        cmocka_unit_test(missing_markers),
+                                       cmocka_unit_test(times_in_ms),
                                        cmocka_unit_test(subject_stays_in_the_name),
                                        cmocka_unit_test(refused),
                                        cmocka_unit_test(reference_file)};

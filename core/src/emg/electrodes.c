@@ -339,18 +339,6 @@ static mhe_status find_mvc(const mhi_run *run, const mhe_description *model, dou
     return open > 0 && run->emg.mvc_file != NULL ? read_mvc_file(run, model, mvc, err) : MHE_OK;
 }
 
-static mhe_status check_overlap(const mhi_table *table, double offset, const double *time,
-                                int32_t n_frames, mhe_error *err) {
-    const double first = table->time[0] + offset, last = table->time[table->n_rows - 1] + offset;
-    if (n_frames == 0 || (first <= time[n_frames - 1] && last >= time[0])) {
-        return MHE_OK;
-    }
-    return mhe_fail(err, MHE_E_INPUT,
-                    "%s: the EMG, %g to %g s, and the frames, %g to %g s, have no time in common "
-                    "(data.emg_offset moves the EMG)",
-                    table->path, first, last, time[0], time[n_frames - 1]);
-}
-
 mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
                                const double *time, int32_t n_frames, double *emg,
                                int32_t *n_muscles_found, mhi_emg_report *report,
@@ -359,7 +347,7 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
     double *mvc = calloc((size_t)run->emg.n_channels + 1, sizeof *mvc);
     mhe_status status = mvc == NULL
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : check_overlap(table, run->data.emg_offset, time, n_frames, err);
+                            : mhi_emg_check_times(table, run->data.emg_offset, time, n_frames, err);
     if (status == MHE_OK) {
         status = find_mvc(run, model, mvc, err);
     }

@@ -64,5 +64,9 @@ void mhi_electrodes_check_raw(const mhi_run *run, const mhi_table *table, const 
                               const mhe_host *host);
 mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, const double *peaks,
                                       const mhe_host *host, mhe_error *err);
+/* MHE_E_INPUT: EMG that starts `offset` (s) later than its table says has no time in common with
+ * frames at time [n_frames], or goes on for so much longer that it must be in ms. */
+mhe_status mhi_emg_check_times(const mhi_table *table, double offset, const double *time,
+                               int32_t n_frames, mhe_error *err);
 
 #endif

@@ -11,6 +11,7 @@
 #define PEAK_HIGH 2.0 /* fast motions reach 1.5 */
 #define PEAK_IMPOSSIBLE 20.0
 #define PEAK_LOW 0.01
+#define LONGER 300.0 /* than the frames: no recording is, but one in ms */
 
 static void tell(const mhe_host *host, const char *source, const char *what, mhi_text *list) {
     mhi_text line = {0};
@@ -116,4 +117,23 @@ mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, co
     mhi_text_free(&high);
     mhi_text_free(&low);
     return status;
+}
+
+mhe_status mhi_emg_check_times(const mhi_table *table, double offset, const double *time,
+                               int32_t n_frames, mhe_error *err) {
+    const double first = table->time[0] + offset, last = table->time[table->n_rows - 1] + offset;
+    const double from = time[0], to = time[n_frames - 1];
+    if (n_frames > 1 && last - first > LONGER * (to - from)) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s: goes from %g to %g s, the frames from %g to %g s: are its times in ms "
+                        "instead of s?",
+                        table->path, first, last, from, to);
+    }
+    if (first > to || last < from) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s: goes from %g to %g s, the frames from %g to %g s: there is no time in "
+                        "common (data.emg_offset moves the EMG)",
+                        table->path, first, last, from, to);
+    }
+    return MHE_OK;
 }

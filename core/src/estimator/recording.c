@@ -2,6 +2,7 @@
 #include "estimator/recording.h"
 
 #include "estimator/columns.h"
+#include "estimator/marker_unit.h"
 #include "io/motion_file.h"
 
 #include <math.h>
@@ -116,6 +117,9 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
         status = read_quantity(r, table, &naming, names, d->n_markers, 3, 0, &r->markers,
                                &r->n_markers_found, host, err);
     }
+    if (status == MHE_OK) {
+        mhi_marker_settle_unit(r, d, table->path, host);
+    }
     free(names);
     mhi_table_free(table);
     return status;
@@ -189,10 +193,19 @@ static mhe_status read_emg(mhi_recording *r, const mhi_run *run, const mhe_descr
         mhi_table_free(table);
         return status;
     }
+    const double offset = run->data.emg_offset;
     for (int32_t k = 0; k < table->n_rows; k++) {
-        table->time[k] += run->data.emg_offset;
+        table->time[k] += offset;
     }
     const char **names = names_of(d, 'm', d->n_muscles);
+    if (r->time != NULL) {
+        status = mhi_emg_check_times(table, 0, r->time, r->n_frames, err);
+    }
+    if (status != MHE_OK) {
+        free(names);
+        mhi_table_free(table);
+        return status;
+    }
     if (names == NULL) {
         status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
     } else if (r->time == NULL) {

@@ -182,7 +182,13 @@ static mhe_status settle_rate(mhi_table_reader *reader) {
     if (status != MHE_OK || measured == 0 || !isfinite(measured)) {
         return status;
     }
-    if (table->rate > 0 && fabs(measured / table->rate - 1) > 0.01) {
+    if (table->rate > 0 && fabs(1000 * measured / table->rate - 1) < 0.01) {
+        mhi_table_warn(reader, "the header says %g Hz, the times %g Hz: they are taken as ms",
+                       table->rate, measured);
+        for (int32_t i = 0; i < table->n_rows; i++) {
+            table->time[i] /= 1000;
+        }
+    } else if (table->rate > 0 && fabs(measured / table->rate - 1) > 0.01) {
         mhi_table_warn(reader, "the header says %g Hz, the time column %g Hz; the latter is used",
                        table->rate, measured);
         table->rate = 0;

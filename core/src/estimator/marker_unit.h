@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* marker_unit.h: are the markers in the unit that their file says? */
+#ifndef MHI_MARKER_UNIT_H
+#define MHI_MARKER_UNIT_H
+
+#include "estimator/recording.h"
+
+/* Distances of markers on one body are known. Where the measured ones are larger or smaller by a
+ * power of ten as between mm, cm and m, the recording's markers and unit are put right; that, or
+ * distances that fit in no way, is told to the host. [cold] */
+void mhi_marker_settle_unit(mhi_recording *recording, const mhe_description *model,
+                            const char *path, const mhe_host *host);
+
+#endif
