@@ -4,7 +4,7 @@
  * Implicit schemes: one evaluation with derivatives at the start of the step gives a predictor, the
  * stages of the system linearised there. Simplified Newton iterations follow, on the Jacobian of
  * the middle stage (a hundredth to a thousandth of the error is left by each); where they are slow
- * the Jacobian is taken anew at all stages, and where that fails too rk_step halves the step. If
+ * the Jacobian is taken anew at all stages, and where that fails too refine.c halves the step. If
  * derivatives are wanted, a last evaluation with derivatives at the converged stages serves both a
  * last full Newton correction and the implicit function theorem.
  *
@@ -132,6 +132,7 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
     mhe_status status =
         system->acceleration(system, c->system_context, c->q, c->v, c->a_start, r, &out, err);
     if (status == MHE_OK) {
+        rk_keep_start(c);
         status = rk_factor(c, h, 0, err);
     }
     if (status != MHE_OK) {
@@ -294,7 +295,12 @@ static mhe_status rk_explicit(struct rk_context *c, const double *r, double h, i
         if (status != MHE_OK) {
             return status;
         }
-        memcpy(c->K + j * n_q, c->f + j * n_q, sizeof(double) * (size_t)n_q);
+        for (int32_t i = 0; i < n_q; i++) {
+            double f = c->K[j * n_q + i] = c->f[j * n_q + i];
+            if (!isfinite(f)) {
+                return mhe_fail(err, MHE_RETRY, "a step of %g s left the finite", h);
+            }
+        }
     }
     return derivatives ? rk_factor(c, h, -1, err) : MHE_OK;
 }

@@ -73,20 +73,20 @@ void rk_memory_layout(struct rk *rk) {
 }
 
 int rk_memory_slot(const struct rk_context *c, struct rk_slot *out) {
-    if (c->memory == NULL || c->step >= c->rk->memory_steps) {
+    if (c->memory == NULL || c->slot >= c->rk->memory_steps) {
         return 0;
     }
-    rk_slot_at(c->rk, c->memory + c->step * c->rk->memory_stride, out);
+    rk_slot_at(c->rk, c->memory + c->slot * c->rk->memory_stride, out);
     return 1;
 }
 
 int rk_memory_trace(const struct rk_context *c, int32_t k, struct rk_trace *out) {
     const struct rk *rk = c->rk;
-    if (c->memory == NULL || c->step >= rk->memory_steps || k >= rk->memory_traces) {
+    if (c->memory == NULL || c->slot >= rk->memory_steps || k >= rk->memory_traces) {
         return 0;
     }
     rk_trace_at(rk,
-                c->memory + c->step * rk->memory_stride + rk_slot_size(rk) + k * rk_trace_size(rk),
+                c->memory + c->slot * rk->memory_stride + rk_slot_size(rk) + k * rk_trace_size(rk),
                 out);
     return 1;
 }

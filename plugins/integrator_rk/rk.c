@@ -6,10 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* An interval whose steps have no solution is tried again with steps of half the length, this
- * often. */
-#define RK_HALVINGS 3
-
 static void rk_destroy(void *self) {
     free(self);
 }
@@ -29,6 +25,8 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
         rk_tableau_rk4(&rk->mechanics);
     } else {
         rk_tableau_gauss(rk->config.stages, &rk->mechanics);
+        rk_tableau_probes(&rk->mechanics, rk->probes);
+        rk_tests(&rk->mechanics, rk->probes, rk->tests);
     }
     rk_memory_layout(rk);
     *self = rk;
@@ -81,6 +79,9 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                   {&c->K, s * n_q},
                   {&c->stage_q, n_q},
                   {&c->stage_v, n_q},
+                  {&c->defect, RK_PROBES * n_q},
+                  {&c->probe_a, n_m},
+                  {&c->held, 3 * pad},
                   {&c->f, s * n_q},
                   {&c->residual, s * n_q},
                   {&slot, (size_t)rk_slot_size(rk)},
@@ -160,26 +161,6 @@ static void rk_derivatives(const struct rk_context *c, double *A, double *B) {
     }
 }
 
-/* The interval in n steps of length h. */
-static mhe_status rk_steps(struct rk_context *c, const double *u, int32_t n, double h,
-                           int32_t derivatives, mhe_error *err) {
-    const mhe_system *system = c->rk->system;
-    const double *r = system->n_r > 0 ? u + system->n_m : NULL;
-    mhe_status status = MHE_OK;
-    for (int32_t k = 0; k < n && status == MHE_OK; k++) {
-        if (system->n_a > 0) {
-            status = rk_activations(c, u, h, derivatives, err);
-        }
-        if (status == MHE_OK) {
-            status = rk_mechanics(c, r, h, derivatives, err);
-        }
-        if (status == MHE_OK) {
-            status = rk_advance(c, h, derivatives, err);
-        }
-    }
-    return status;
-}
-
 static mhe_status rk_step(void *context, const double *x, const double *u, double dt,
                           double *memory, double *x_next, double *A, double *B, mhe_error *err) {
     struct rk_context *c = context;
@@ -187,11 +168,8 @@ static mhe_status rk_step(void *context, const double *x, const double *u, doubl
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q;
     int32_t n = (int32_t)fmax(1, ceil(dt / c->rk->config.max_step - 1e-9));
-    mhe_status status = MHE_RETRY;
-    for (int32_t halving = 0; halving <= RK_HALVINGS && status == MHE_RETRY; halving++, n *= 2) {
-        rk_begin(c, x, u);
-        status = rk_steps(c, u, n, dt / n, A != NULL, err);
-    }
+    rk_begin(c, x, u);
+    mhe_status status = rk_steps(c, u, n, dt / n, A != NULL, err);
     if (status != MHE_OK) {
         return status;
     }

@@ -16,6 +16,8 @@
 #define RK_ACTIVATION_STAGES 4
 #define RK_LANES 4   /* muscles that are computed side by side */
 #define RK_WEIGHED 4 /* activation steps in a mechanical one, whose weights are known ahead */
+#define RK_PROBES 5
+#define RK_TESTS 4
 #define RK_GAUSS 0
 #define RK_RK4 1
 
@@ -27,6 +29,7 @@ struct rk_config {
     double newton_tolerance;
     int32_t max_newton;
     double activation_step; /* in their shortest time constants */
+    double tolerance;       /* 0: none */
 };
 
 /* Row-major, `stages` wide. Stage times c do not decrease. */
@@ -43,10 +46,28 @@ struct rk_tableau {
 void rk_tableau_gauss(int32_t stages, struct rk_tableau *out); /* 1..RK_MAX_STAGES */
 void rk_tableau_rk4(struct rk_tableau *out);
 
+/* A time between the stages. On a step of length h the collocation polynomial has there the
+ * acceleration sum_k at_k K_k, and
+ * v(t) = v + h sum_k v_k K_k,   q(t) = q + h t v + h^2 sum_k q_k K_k. */
+struct rk_probe {
+    double t; /* in 0..1 */
+    double at[RK_MAX_STAGES], v[RK_MAX_STAGES], q[RK_MAX_STAGES];
+};
+
+/* A test of a step on the defects at its first probes (refine.c). */
+struct rk_test {
+    int32_t probes, terms;
+    double basis[RK_PROBES]
+                [RK_PROBES]; /* [terms x probes] what a smooth step may have of defects */
+    double scale;            /* of the rest, to bound the error in v */
+};
+
 struct rk {
     const mhe_system *system;
     struct rk_config config;
     struct rk_tableau mechanics, activation;
+    struct rk_probe probes[RK_PROBES]; /* Gauss only, and the tests */
+    struct rk_test tests[RK_TESTS];
     int32_t pad; /* n_m in whole lanes */
     /* memory of an interval: steps, steps of the activations in one of them, doubles of a step */
     int32_t memory_steps, memory_traces, memory_stride;
@@ -76,7 +97,8 @@ struct rk_context {
     void *system_context;
     double *arrays; /* all arrays below */
     double *memory; /* the interval's, NULL: none */
-    int32_t step;   /* number of the mechanical step in it */
+    int32_t step;   /* mechanical steps done in the interval */
+    int32_t slot;   /* of the present one in the memory; memory_steps: none */
 
     /* activations */
     double *a, *a_a, *a_e;             /* [pad] value now; its derivatives by start and control */
@@ -94,6 +116,10 @@ struct rk_context {
     double *stage_q, *stage_v; /* [n_q] of the stage in work */
     double *f;                 /* [s x n_q] */
     double *residual;          /* [s n_q] */
+    double *defect;            /* [RK_PROBES x n_q] of the step just solved */
+    double *probe_a;           /* [n_m] */
+    double *held;              /* [3 x pad] a, a_a, a_e at the start of a step */
+    int32_t start_kept;        /* whether f at the first probe is there already */
     struct rk_slot own, kept;  /* linearisations: the context's; the memory's of this step */
     struct rk_slot *at;        /* the one in use */
     int32_t keeps;             /* this call may write to `kept` */
@@ -118,6 +144,19 @@ mhe_status rk_mechanics(struct rk_context *c, const double *r, double h, int32_t
 
 /* Moves q, v, and with `derivatives` also `sens`, over the step just solved. [hot] */
 mhe_status rk_advance(struct rk_context *c, double h, int32_t derivatives, mhe_error *err);
+
+/* The interval in n steps of length h, halved where they have no solution or err by more than the
+ * tolerance (refine.c). [hot] */
+mhe_status rk_steps(struct rk_context *c, const double *u, int32_t n, double h, int32_t derivatives,
+                    mhe_error *err);
+
+/* The probes of a collocation scheme. */
+void rk_tableau_probes(const struct rk_tableau *t, struct rk_probe out[RK_PROBES]);
+void rk_tests(const struct rk_tableau *t, const struct rk_probe *probes, struct rk_test *out);
+
+/* Right after the evaluation at the start of a step (f, f_a of stage 0): keeps f at the first
+ * probe. [hot] */
+void rk_keep_start(struct rk_context *c);
 
 /* Chains the derivatives of the step just solved onto `sens`. [hot] */
 void rk_chain(struct rk_context *c, double h);

@@ -68,6 +68,23 @@ void rk_tableau_gauss(int32_t stages, struct rk_tableau *out) {
     rk_tableau_finish(out);
 }
 
+void rk_tableau_probes(const struct rk_tableau *t, struct rk_probe out[RK_PROBES]) {
+    int32_t s = t->stages;
+    for (int32_t i = 0; i < RK_PROBES; i++) {
+        struct rk_probe *probe = &out[i];
+        static const double at[] = {0, 1, 0.2, 0.5, 0.8};
+        *probe = (struct rk_probe){.t = at[i]};
+        for (int32_t k = 0; k < s; k++) {
+            probe->at[k] = rk_lagrange(t->c, s, k, probe->t);
+            for (int32_t m = 0; m < s; m++) {
+                double value = t->b[m] * rk_lagrange(t->c, s, k, probe->t * t->c[m]);
+                probe->v[k] += probe->t * value;
+                probe->q[k] += probe->t * probe->t * (1 - t->c[m]) * value;
+            }
+        }
+    }
+}
+
 void rk_tableau_rk4(struct rk_tableau *out) {
     *out = (struct rk_tableau){.stages = 4,
                                .is_explicit = 1,

@@ -13,6 +13,8 @@
 
 #define RK "mhe.integrator.rk"
 #define CVODES "mhe.integrator.sundials"
+#define EXACT "{rtol: 1e-10, atol: 1e-12}"
+#define REFINED "tolerance: 5e-6"
 #define N_Q 4
 #define N_M 19
 #define N_X (2 * N_Q + N_M)
@@ -149,20 +151,13 @@ static int away_from_kinks(struct arm *arm, const struct test_integrator *fine, 
 }
 
 /* Random intervals of length dt and where CVODES at 1e-10 ends them. */
-static void draw(struct arm *arm, const mhi_table *motion, double dt, int kinks,
-                 struct sample *out) {
-    struct test_integrator fine = test_integrator_open(RK, "stages: 2", &arm->counted, arm);
-    struct test_integrator exact =
-        test_integrator_open(CVODES, "{rtol: 1e-10, atol: 1e-12}", &arm->counted, arm);
+static void draw(struct arm *arm, const mhi_table *motion, double dt, struct sample *out) {
+    struct test_integrator exact = test_integrator_open(CVODES, EXACT, &arm->counted, arm);
     uint64_t seed = 31;
-    for (int k = 0; k < N_STATES;) {
+    for (int k = 0; k < N_STATES; k++) {
         random_state(&seed, motion, out->x[k], out->u[k]);
-        if (!kinks || away_from_kinks(arm, &fine, out->x[k], out->u[k], dt)) {
-            test_integrate(&exact, out->x[k], out->u[k], dt, out->exact[k], NULL, NULL);
-            k++;
-        }
+        test_integrate(&exact, out->x[k], out->u[k], dt, out->exact[k], NULL, NULL);
     }
-    test_integrator_close(&fine);
     test_integrator_close(&exact);
 }
 
@@ -213,7 +208,7 @@ static void degroote2016_against_cvodes(void **state) {
         skip();
     }
     for (size_t d = 0; d < N_INTERVALS; d++) {
-        draw(&arm, motion, intervals[d], 0, &sample);
+        draw(&arm, motion, intervals[d], &sample);
         double worst = study(&arm, "", intervals[d], &sample);
         for (size_t k = 0; k < sizeof others / sizeof others[0]; k++) {
             (void)study(&arm, others[k], intervals[d], &sample);
@@ -224,9 +219,38 @@ static void degroote2016_against_cvodes(void **state) {
     mhi_table_free(motion);
 }
 
-/* Where no kink is crossed; a kink costs any fixed step more. Long intervals without one are rare.
- */
-static void paper2021_against_cvodes(void **state) {
+/* Kinks and jumps (paper2021: Ldot = 0, fibre length = tendon slack length; biorbd: Ldot = 0;
+ * thelen2003: n = 1, Ldot = 0) are met in most intervals. */
+static void kinks_against_cvodes(void **state) {
+    (void)state;
+    static struct sample sample;
+    static const char *const curves[] = {"curves: paper2021", "curves: biorbd",
+                                         "curves: thelen2003", "curves: degroote2016"};
+    mhi_table *motion = seed_motion();
+    if (motion == NULL || test_plugin(CVODES, MHE_INTEGRATOR_IFACE) == NULL) {
+        mhi_table_free(motion);
+        skip();
+    }
+    for (size_t k = 0; k < sizeof curves / sizeof curves[0]; k++) {
+        struct arm arm;
+        if (!arm_open(&arm, curves[k])) {
+            mhi_table_free(motion);
+            skip();
+        }
+        print_message("%s\n", curves[k]);
+        for (size_t d = 0; d < N_INTERVALS; d++) {
+            draw(&arm, motion, intervals[d], &sample);
+            (void)study(&arm, "tolerance: 0", intervals[d], &sample);
+            assert_true(study(&arm, REFINED, intervals[d], &sample) < 1e-5);
+        }
+        arm_close(&arm);
+    }
+    mhi_table_free(motion);
+}
+
+/* Where forces jump, BDF and Adams formulas still converge, and to the same end: the reference is
+ * one. */
+static void reference_converges(void **state) {
     (void)state;
     static struct sample sample;
     struct arm arm;
@@ -236,37 +260,67 @@ static void paper2021_against_cvodes(void **state) {
         mhi_table_free(motion);
         skip();
     }
-    for (size_t d = 0; d < 3; d++) {
-        draw(&arm, motion, intervals[d], 1, &sample);
-        assert_true(study(&arm, "", intervals[d], &sample) < 1e-5);
+    static const char *const finer[] = {
+        "{rtol: 1e-12, atol: 1e-14, max_steps: 1000000}",
+        "{rtol: 1e-12, atol: 1e-14, max_steps: 1000000, method: adams}"};
+    draw(&arm, motion, 0.03, &sample);
+    for (int i = 0; i < 2; i++) {
+        struct test_integrator other = test_integrator_open(CVODES, finer[i], &arm.counted, &arm);
+        double worst = 0;
+        for (int k = 0; k < N_STATES; k++) {
+            double next[N_X];
+            test_integrate(&other, sample.x[k], sample.u[k], 0.03, next, NULL, NULL);
+            worst = fmax(worst, test_relative(next, sample.exact[k], N_X));
+        }
+        print_message("CVODES against itself, %s: %.1e\n", finer[i], worst);
+        assert_true(worst < 1e-6);
+        test_integrator_close(&other);
     }
+    arm_close(&arm);
+    mhi_table_free(motion);
+}
+
+/* Worst error of A and B against differences at five random states, away from kinks if asked. */
+static void differences(const char *curves, const char *yaml, double dt, int smooth) {
+    struct arm arm;
+    mhi_table *motion = seed_motion();
+    if (motion == NULL || !arm_open(&arm, curves)) {
+        mhi_table_free(motion);
+        skip();
+    }
+    struct test_integrator rk = test_integrator_open(RK, yaml, &arm.counted, &arm);
+    struct test_integrator fine =
+        test_integrator_open(RK, "{stages: 2, tolerance: 0}", &arm.counted, &arm);
+    uint64_t seed = 41;
+    double worst = 0;
+    for (int trial = 0; trial < 5;) {
+        double x[N_X], u[N_M];
+        random_state(&seed, motion, x, u);
+        if (!smooth || away_from_kinks(&arm, &fine, x, u, dt)) {
+            double error = test_step_derivatives(&rk, x, u, dt);
+            assert_true(error >= 0);
+            worst = fmax(worst, error);
+            trial++;
+        }
+    }
+    print_message("%s, %s: A, B against differences: %.1e\n", curves, yaml, worst);
+    assert_true(worst < 1e-6);
+    test_integrator_close(&rk);
+    test_integrator_close(&fine);
     arm_close(&arm);
     mhi_table_free(motion);
 }
 
 static void derivatives(void **state) {
     (void)state;
-    struct arm arm;
-    mhi_table *motion = seed_motion();
-    if (motion == NULL || !arm_open(&arm, "curves: degroote2016")) {
-        mhi_table_free(motion);
-        skip();
-    }
-    struct test_integrator rk = test_integrator_open(RK, "", &arm.counted, &arm);
-    uint64_t seed = 41;
-    double worst = 0;
-    for (int trial = 0; trial < 5; trial++) {
-        double x[N_X], u[N_M];
-        random_state(&seed, motion, x, u);
-        double error = test_step_derivatives(&rk, x, u, 0.03);
-        assert_true(error >= 0);
-        worst = fmax(worst, error);
-    }
-    print_message("A, B of the arm against differences: %.1e\n", worst);
-    assert_true(worst < 1e-6);
-    test_integrator_close(&rk);
-    arm_close(&arm);
-    mhi_table_free(motion);
+    differences("curves: degroote2016", "", 0.03, 0);
+}
+
+/* The second tolerance cuts smooth steps too: A and B are those of the steps taken. */
+static void derivatives_of_cut_steps(void **state) {
+    (void)state;
+    differences("curves: paper2021", REFINED, 0.01, 1);
+    differences("curves: degroote2016", "tolerance: 1e-9", 0.03, 0);
 }
 
 /* One interval from each node of the seed's motion lands on the next. */
@@ -319,13 +373,14 @@ static void seed_landing_by_cvodes(void **state) {
         skip();
     }
     assert_int_equal(motion->n_rows, 801);
-    landing(&arm, motion, CVODES, "{rtol: 1e-10, atol: 1e-12}", &dq, &dv, &da);
+    landing(&arm, motion, CVODES, EXACT, &dq, &dv, &da);
     assert_true(dq < 1e-5 && dv < 1e-3 && da < 1e-6);
     arm_close(&arm);
     mhi_table_free(motion);
 }
 
-/* Every interval of the seed's motion that crosses no kink ends where CVODES ends it. */
+/* Every interval of the seed's motion ends where CVODES ends it, without cuts those that cross no
+ * kink. */
 static void seed_against_cvodes(void **state) {
     (void)state;
     struct arm arm;
@@ -335,36 +390,47 @@ static void seed_against_cvodes(void **state) {
         mhi_table_free(motion);
         skip();
     }
-    struct test_integrator rk = test_integrator_open(RK, "", &arm.counted, &arm);
-    struct test_integrator exact =
-        test_integrator_open(CVODES, "{rtol: 1e-10, atol: 1e-12}", &arm.counted, &arm);
-    double worst[2] = {0, 0}; /* with and without kinks */
+    struct test_integrator fixed = test_integrator_open(RK, "tolerance: 0", &arm.counted, &arm);
+    struct test_integrator refined = test_integrator_open(RK, REFINED, &arm.counted, &arm);
+    struct test_integrator exact = test_integrator_open(CVODES, EXACT, &arm.counted, &arm);
+    double worst[2] = {0, 0}, worst_refined = 0; /* with and without kinks; all */
     int count[2] = {0, 0};
+    int64_t price[2] = {0, 0}; /* evaluations on intervals without kinks */
     for (int32_t k = 0; k + 1 < motion->n_rows; k++) {
         const double *x = motion->values + k * motion->n_columns, *u = x + N_X;
         double next[N_X], expected[N_X];
-        int smooth = away_from_kinks(&arm, &rk, x, u, 0.01);
-        test_integrate(&rk, x, u, 0.01, next, NULL, NULL);
+        int smooth = away_from_kinks(&arm, &fixed, x, u, 0.01);
         test_integrate(&exact, x, u, 0.01, expected, NULL, NULL);
+        arm.plain = arm.full = 0;
+        test_integrate(&fixed, x, u, 0.01, next, NULL, NULL);
         worst[smooth] = fmax(worst[smooth], test_relative(next, expected, N_X));
+        price[0] += smooth * (arm.plain + arm.full);
+        arm.plain = arm.full = 0;
+        test_integrate(&refined, x, u, 0.01, next, NULL, NULL);
+        worst_refined = fmax(worst_refined, test_relative(next, expected, N_X));
+        price[1] += smooth * (arm.plain + arm.full);
         count[smooth]++;
     }
-    print_message("seed's motion against CVODES: %.1e over %d intervals, %.1e over %d with kinks\n",
-                  worst[1], count[1], worst[0], count[0]);
+    print_message("seed's motion against CVODES: fixed steps %.1e over %d intervals, %.1e over %d "
+                  "with kinks; refined %.1e; accelerations without kinks %.2f, refined %.2f\n",
+                  worst[1], count[1], worst[0], count[0], worst_refined,
+                  (double)price[0] / count[1], (double)price[1] / count[1]);
     assert_true(count[1] > 400);
     assert_true(worst[1] < 1e-5);
-    test_integrator_close(&rk);
+    assert_true(worst_refined < 1e-5);
+    assert_true(price[1] - price[0] < 2 * count[1]);
+    test_integrator_close(&fixed);
+    test_integrator_close(&refined);
     test_integrator_close(&exact);
     arm_close(&arm);
     mhi_table_free(motion);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(degroote2016_against_cvodes),
-                                       cmocka_unit_test(paper2021_against_cvodes),
-                                       cmocka_unit_test(derivatives),
-                                       cmocka_unit_test(seed_landing),
-                                       cmocka_unit_test(seed_landing_by_cvodes),
-                                       cmocka_unit_test(seed_against_cvodes)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(degroote2016_against_cvodes), cmocka_unit_test(kinks_against_cvodes),
+        cmocka_unit_test(reference_converges),         cmocka_unit_test(derivatives),
+        cmocka_unit_test(derivatives_of_cut_steps),    cmocka_unit_test(seed_landing),
+        cmocka_unit_test(seed_landing_by_cvodes),      cmocka_unit_test(seed_against_cvodes)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

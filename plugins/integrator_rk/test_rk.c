@@ -120,8 +120,8 @@ static void memory(void **state) {
 /* Mean error of (q, v) after 80 ms over some random states. */
 static double mean_error(const mhe_system *system, const char *scheme, double max_step) {
     char yaml[96];
-    (void)snprintf(yaml, sizeof yaml, "{%s, max_step: %g, newton_tolerance: 1e-13}", scheme,
-                   max_step);
+    (void)snprintf(yaml, sizeof yaml, "{%s, max_step: %g, newton_tolerance: 1e-13, tolerance: 0}",
+                   scheme, max_step);
     struct test_integrator rk = test_integrator_open(RK, yaml, system, NULL);
     struct test_integrator fine =
         test_integrator_open(RK, "{stages: 6, max_step: 0.004}", system, NULL);
@@ -328,11 +328,89 @@ static void bad_points(void **state) {
     test_integrator_close(&rk);
 }
 
+/* ---- a force that jumps, or has a kink, where a coordinate passes 0 ---- */
+
+static int32_t broken_power; /* 0: a jump, 1: a kink */
+static int64_t broken_calls;
+
+static mhe_status broken_acceleration(const mhe_system *system, void *context, const double *q,
+                                      const double *v, const double *a, const double *r,
+                                      const mhe_acceleration *out, mhe_error *err) {
+    (void)system, (void)context, (void)a, (void)r, (void)err;
+    double push = broken_power == 0 ? -20 : -400 * q[0], pull = broken_power == 0 ? 0 : -400;
+    broken_calls++;
+    out->vdot[0] = 10 + (q[0] > 0 ? push : 0);
+    out->vdot[1] = -v[1];
+    if (out->vdot_q != NULL) {
+        memset(out->vdot_q, 0, sizeof(double) * SYSTEM_Q * SYSTEM_Q);
+        memset(out->vdot_v, 0, sizeof(double) * SYSTEM_Q * SYSTEM_Q);
+        memset(out->vdot_a, 0, sizeof(double) * SYSTEM_Q * SYSTEM_M);
+        out->vdot_q[0] = q[0] > 0 ? pull : 0;
+        out->vdot_v[3] = -1;
+    }
+    return MHE_OK;
+}
+
+/* (q, v) of the broken coordinate after dt from (q < 0, v > 0): a parabola up to 0, then another or
+ * a sine. */
+static void broken_exact(double q, double v, double dt, double *next) {
+    double t = (sqrt(v * v - 20 * q) - v) / 10; /* of the passage */
+    if (t >= dt) {
+        next[0] = q + v * dt + 5 * dt * dt;
+        next[1] = v + 10 * dt;
+        return;
+    }
+    double w = v + 10 * t, left = dt - t;
+    if (broken_power == 0) {
+        next[0] = w * left - 5 * left * left;
+        next[1] = w - 10 * left;
+    } else { /* q'' = 10 - 400 q */
+        next[0] = 0.025 + w / 20 * sin(20 * left) - 0.025 * cos(20 * left);
+        next[1] = w * cos(20 * left) + 0.5 * sin(20 * left);
+    }
+}
+
+static void broken_forces(void **state) {
+    (void)state;
+    mhe_system system;
+    test_pendulum_system(0, &system);
+    system.acceleration = broken_acceleration;
+    for (int stages = 1; stages <= 6; stages++) {
+        char yaml[2][64];
+        (void)snprintf(yaml[0], sizeof yaml[0], "{stages: %d, tolerance: 0}", stages);
+        (void)snprintf(yaml[1], sizeof yaml[1], "{stages: %d, tolerance: 1e-6}", stages);
+        for (broken_power = 0; broken_power < 2; broken_power++) {
+            double worst[2] = {0, 0}, price[2] = {0, 0};
+            for (int refined = 0; refined < 2; refined++) {
+                struct test_integrator rk = test_integrator_open(RK, yaml[refined], &system, NULL);
+                uint64_t seed = 12;
+                broken_calls = 0;
+                for (int trial = 0; trial < 200; trial++) {
+                    double x[4] = {test_random(&seed, -0.02, 0), 0, test_random(&seed, 0.2, 1), 0};
+                    double u[SYSTEM_M] = {0, 0, 0}, next[4], exact[2];
+                    test_integrate(&rk, x, u, 0.03, next, NULL, NULL);
+                    broken_exact(x[0], x[2], 0.03, exact);
+                    worst[refined] = fmax(worst[refined], fabs(next[0] - exact[0]));
+                    worst[refined] = fmax(worst[refined], fabs(next[2] - exact[1]));
+                }
+                price[refined] = (double)broken_calls / 200;
+                test_integrator_close(&rk);
+            }
+            print_message("%d stages, %s: fixed %.1e (%.0f accelerations), refined %.1e (%.0f)\n",
+                          stages, broken_power == 0 ? "jump" : "kink", worst[0], price[0], worst[1],
+                          price[1]);
+            assert_true(worst[0] > 1e-5);
+            assert_true(worst[1] < 1e-6);
+        }
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(derivatives),    cmocka_unit_test(same_step_with_derivatives),
         cmocka_unit_test(memory),         cmocka_unit_test(order),
         cmocka_unit_test(linear_system),  cmocka_unit_test(energy),
-        cmocka_unit_test(against_cvodes), cmocka_unit_test(bad_points)};
+        cmocka_unit_test(against_cvodes), cmocka_unit_test(bad_points),
+        cmocka_unit_test(broken_forces)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
