@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* clones.h: loops that are worth it are compiled twice on x86-64, for any processor and for those
  * with AVX2; the loader of shared objects chooses. Other architectures have their vectors anyway.
- * Without contraction to fused operations (ISO C) both give the same bits. */
+ * For static functions: the compiler would export others. Without contraction to fused operations
+ * (ISO C) both give the same bits. */
 #ifndef PLUGINS_CLONES_H
 #define PLUGINS_CLONES_H
 

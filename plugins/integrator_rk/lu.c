@@ -3,9 +3,11 @@
  * into LAPACK costs as much as the arithmetic. */
 #include "rk.h"
 
+#include "../clones.h"
+
 #include <math.h>
 
-int rk_lu_factor(double *a, int32_t n, int32_t *pivots) {
+CLONES static int rk_factor_rows(double *a, int32_t n, int32_t *pivots) {
     for (int32_t k = 0; k < n; k++) {
         double *row_k = a + k * n;
         int32_t p = k;
@@ -65,8 +67,8 @@ static inline void rk_subtract(double *restrict to, double factor, const double 
     }
 }
 
-void rk_lu_solve_transposed(const double *lu, int32_t n, const int32_t *pivots, double *x,
-                            int32_t m) {
+CLONES static void rk_solve_rows(const double *lu, int32_t n, const int32_t *pivots, double *x,
+                                 int32_t m) {
     for (int32_t k = 0; k < n; k++) { /* U' y = x */
         double *row = x + k * m;
         for (int32_t i = 0; i < m; i++) {
@@ -88,4 +90,13 @@ void rk_lu_solve_transposed(const double *lu, int32_t n, const int32_t *pivots, 
             x[pivots[k] * m + i] = swap;
         }
     }
+}
+
+int rk_lu_factor(double *a, int32_t n, int32_t *pivots) {
+    return rk_factor_rows(a, n, pivots);
+}
+
+void rk_lu_solve_transposed(const double *lu, int32_t n, const int32_t *pivots, double *x,
+                            int32_t m) {
+    rk_solve_rows(lu, n, pivots, x, m);
 }

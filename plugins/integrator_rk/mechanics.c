@@ -104,16 +104,19 @@ static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_er
 static double rk_correct(struct rk_context *c, double h) {
     int32_t n_q = c->rk->system->n_q, n = c->rk->mechanics.stages * n_q;
     rk_lu_solve(c->at->lu, n, c->at->pivots, c->residual);
-    double largest = 0, speed = 0;
+    double largest = 0, speed = 0, sum = 0;
     for (int32_t i = 0; i < n; i++) {
-        if (!isfinite(c->residual[i])) {
-            return NAN;
-        }
-        largest = fmax(largest, fabs(c->residual[i]));
+        double size = fabs(c->residual[i]);
+        largest = size > largest ? size : largest;
+        sum += size; /* not finite if one is not */
         c->K[i] += c->residual[i];
     }
+    if (!isfinite(sum)) {
+        return NAN;
+    }
     for (int32_t i = 0; i < n_q; i++) {
-        speed = fmax(speed, fabs(c->v[i]));
+        double size = fabs(c->v[i]);
+        speed = size > speed ? size : speed;
     }
     return h * largest / (1 + speed);
 }

@@ -5,6 +5,7 @@
  *     W = [h^2 b A; h b] J^-1   [2 n_q x s n_q]
  * turns any change of a right-hand side f_j into a change of (q+, v+): 2 n_q solves with J^T
  * instead of one a parameter. All loops run along rows that the compiler vectorises. */
+#include "../clones.h"
 #include "rk.h"
 
 #include <string.h>
@@ -77,7 +78,7 @@ static void rk_direct(struct rk_context *c, int32_t i, double *next) {
     }
 }
 
-void rk_chain(struct rk_context *c, double h) {
+CLONES static void rk_chain_rows(struct rk_context *c, double h) {
     int32_t two = 2 * c->rk->system->n_q, columns = c->columns;
     rk_adjoint(c, h);
     rk_carry(c, h);
@@ -96,4 +97,8 @@ void rk_chain(struct rk_context *c, double h) {
     double *swap = c->sens;
     c->sens = c->sens_next;
     c->sens_next = swap;
+}
+
+void rk_chain(struct rk_context *c, double h) {
+    rk_chain_rows(c, h);
 }
