@@ -25,8 +25,8 @@ static const mhe_plugin rk_plugin = {
     .size = sizeof rk_plugin,
     .id = "mhe.integrator.rk",
     .version = "0.1.0",
-    .summary = "Fixed-step Gauss-Legendre or explicit Runge-Kutta steps with the exact derivatives "
-               "of the discrete map.",
+    .summary = "Gauss-Legendre or explicit Runge-Kutta steps with the exact derivatives of the "
+               "discrete map.",
     .reference = "Hairer, Wanner: Solving Ordinary Differential Equations II, chapter IV.8",
     .iface = MHE_INTEGRATOR_IFACE,
     .ops = &rk_ops,

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* rk.h: fixed-step Runge-Kutta schemes on the musculoskeletal shape of mhe/integrator.h.
+/* rk.h: Runge-Kutta schemes on the musculoskeletal shape of mhe/integrator.h.
  *
  * A step of length h is split by structure. Activations are scalar equations that see neither q nor
- * v: they are carried first, by collocation on steps of their own (activation.c). What remains, q''
- * = f(q, v, a(t), r), is solved for the stage accelerations K_j alone (mechanics.c): v_j = v + h
- * sum_k A_jk K_k,   q_j = q + h c_j v
- * + h^2 sum_k (A A)_jk K_k,   K_j = f(q_j, v_j, a_j, r) v+ = v + h sum_j b_j K_j,     q+ = q + h v
- * + h^2 sum_j (b A)_j K_j */
+ * v: they are carried first, by collocation on steps of their own (activation.c). What remains,
+ * q'' = f(q, v, a(t), r), is solved for the stage accelerations K_j alone (mechanics.c):
+ *     v_j = v + h sum_k A_jk K_k,   q_j = q + h c_j v + h^2 sum_k (A A)_jk K_k
+ *     K_j = f(q_j, v_j, a_j, r)
+ *     v+ = v + h sum_j b_j K_j,     q+ = q + h v + h^2 sum_j (b A)_j K_j
+ * With a tolerance, steps that err by more are halved (refine.c). */
 #ifndef INTEGRATOR_RK_H
 #define INTEGRATOR_RK_H
 

@@ -72,15 +72,15 @@ static void same_step_with_derivatives(void **state) {
 }
 
 /* A memory changes the price, not the result: along a line of starts, in steps of all sizes, with
- * values and derivatives asked for in turn. */
-static void memory(void **state) {
-    (void)state;
+ * values and derivatives asked for in turn. With a tolerance it may tip the scales of a step that
+ * is close to it. */
+static void memory_of(const char *yaml, double most) {
     uint64_t seed = 12;
     double worst = 0, worst_derivative = 0;
     for (int32_t flags = 0; flags < N_FLAGS; flags++) {
         mhe_system system;
         test_pendulum_system(flags, &system);
-        struct test_integrator rk = test_integrator_open(RK, "stages: 3", &system, NULL);
+        struct test_integrator rk = test_integrator_open(RK, yaml, &system, NULL);
         double *kept = calloc((size_t)rk.ops->memory_size(rk.self), sizeof *kept);
         double x[SYSTEM_X], u[SYSTEM_U];
         assert_non_null(kept);
@@ -111,10 +111,16 @@ static void memory(void **state) {
         free(kept);
         test_integrator_close(&rk);
     }
-    print_message("with and without a memory: values %.1e, A and B %.1e\n", worst,
+    print_message("%s, with and without a memory: values %.1e, A and B %.1e\n", yaml, worst,
                   worst_derivative);
-    assert_true(worst < 1e-9);            /* newton_tolerance and what follows from it */
+    assert_true(worst < most);
     assert_true(worst_derivative < 1e-5); /* stages off by at most RK_LAST */
+}
+
+static void memory(void **state) {
+    (void)state;
+    memory_of("stages: 3", 1e-9); /* newton_tolerance and what follows from it */
+    memory_of("{stages: 3, tolerance: 1e-6}", 1e-6);
 }
 
 /* Mean error of (q, v) after 80 ms over some random states. */
