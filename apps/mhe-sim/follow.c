@@ -95,6 +95,7 @@ static mhe_status follow_path(follow *f, mhe_error *err) {
     posture_at(f, p->time[0], f->q);
     memset(s->x_next, 0, sizeof(double) * (size_t)s->n_q);
     mhi_estimator_set_start(f->estimator, f->q, s->x_next);
+    mhi_estimator_set_outlier(f->estimator, 0);
     for (int32_t ahead = 0; ahead <= n + window && status == MHE_OK; ahead++) {
         const int32_t k = ahead - window; /* the window's first node */
         const double time = p->time[0] + k / s->rate;
@@ -127,6 +128,11 @@ mhe_status motion_follow(const motion_setup *setup, mhe_error *err) {
             err, MHE_E_CONFIG,
             "%s: horizon.ratio is %d; to follow a path it must be 1 (--rate sets the step)",
             setup->run->path, setup->run->horizon.ratio);
+    }
+    if (setup->run->output.node != 0) {
+        return mhe_fail(err, MHE_E_CONFIG,
+                        "%s: output.node is '%s'; to follow a path it is 'first'", setup->run->path,
+                        setup->run->output.node_name);
     }
     mhe_status status = mhi_estimator_create(setup->run, setup->host, &f.estimator, err);
     if (status == MHE_OK) {

@@ -304,6 +304,25 @@ static mhe_status read_plugin_sections(const struct reader *r, const char *iface
 
 /* ---- what no single key can tell ---- */
 
+static mhe_status read_node(const struct reader *r) {
+    mhi_output_section *o = &r->run->output;
+    const int32_t window = r->run->horizon.window;
+    char *end = NULL;
+    const long k = strtol(o->node_name, &end, 10);
+    if (strcmp(o->node_name, "auto") == 0 || strcmp(o->node_name, "first") == 0) {
+        o->node = 0;
+    } else if (strcmp(o->node_name, "last") == 0) {
+        o->node = window;
+    } else if (end != o->node_name && *end == '\0' && k >= 0 && k <= window) {
+        o->node = (int32_t)k;
+    } else {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, section_node(r->run, "output"),
+                           "output.node: '%s' is no node of the window: first, last, or 0 to %d",
+                           o->node_name, (int)window);
+    }
+    return MHE_OK;
+}
+
 static mhe_status check_run(const struct reader *r) {
     mhi_run *run = r->run;
     const mhi_bounds_section *b = &run->bounds;
@@ -326,7 +345,7 @@ static mhe_status check_run(const struct reader *r) {
     if (run->emg.delay < 0) {
         run->emg.delay = by_activation ? 0.02 : 0;
     }
-    return MHE_OK;
+    return read_node(r);
 }
 
 /* The tree, then all sections or those of a scope. */

@@ -32,8 +32,9 @@ typedef struct mhi_model_section {
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
     double emg_offset;                     /* s, added to the EMG file's times */
-    int32_t emg_delay; /* frames by which the tracked EMG lags: activation-driven default 2,
-                        * excitation-driven and with electrodes 0 (-1 in the file = by default) */
+    int32_t emg_delay;     /* frames by which the tracked EMG lags: activation-driven default 2,
+                            * excitation-driven and with electrodes 0 (-1 in the file = by default) */
+    double marker_outlier; /* m; 0: none */
 } mhi_data_section;
 
 #define MHI_EMG_LOW_PASS 0
@@ -87,7 +88,14 @@ typedef struct mhi_bounds_section {
     double activation_min, activation_max, excitation_min, excitation_max;
 } mhi_bounds_section;
 
+typedef struct mhi_realtime_section {
+    double deadline_ms; /* 0: none */
+    int32_t threads;
+} mhi_realtime_section;
+
 typedef struct mhi_output_section {
+    const char *node_name; /* as written; "auto" is left to the program */
+    int32_t node;          /* what it means: 0 .. window; "auto": 0 */
     int32_t picture; /* draw estimated against reference with gnuplot, where it is installed */
     int32_t skip_first, skip_last; /* estimates left out of the errors in summary.json */
 } mhi_output_section;
@@ -107,6 +115,7 @@ typedef struct mhi_run {
     mhi_initial_section initial;
     mhi_horizon_section horizon;
     mhi_bounds_section bounds;
+    mhi_realtime_section realtime;
     mhi_output_section output;
     mhi_tree *tree;
     mhi_arena arena; /* all of the above */

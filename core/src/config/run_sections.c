@@ -44,6 +44,9 @@ static const mhe_option data_options[] = {
     MHE_OPT_INT(mhi_data_section, emg_delay, -1, -1, 1000, "samples",
                 "Samples by which the tracked EMG lags behind; -1: 0 when excitation-driven or "
                 "with emg.channels, 2 when activation-driven."),
+    MHE_OPT_REAL(mhi_data_section, marker_outlier, 0.2, 0, DBL_MAX, "m",
+                 "A marker that is further from where the model expects it, beside how far markers "
+                 "are anyway, is left out; 0: none."),
 };
 
 static const mhe_option emg_options[] = {
@@ -127,7 +130,21 @@ static const mhe_option solver_options[] = {
     MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.solver.ipopt", "Plugin of the solver."),
 };
 
+static const mhe_option realtime_options[] = {
+    MHE_OPT_REAL(mhi_realtime_section, deadline_ms, 0, 0, 1e6, "ms",
+                 "Time from a frame to its estimate, after which a solve ends with what it has; 0: "
+                 "no limit, with mhe-run --realtime the time between frames."),
+    MHE_OPT_INT(mhi_realtime_section, threads, 1, 1, 256, "1",
+                "Threads that evaluate a window's intervals, where the solver can use them."),
+};
+
 static const mhe_option output_options[] = {
+    {.key = "node",
+     .help = "Whose estimates are given: first (the oldest frame of the window), last, or the "
+             "number of a node; auto: first, with mhe-run --realtime last.",
+     .text_default = "auto",
+     .type = MHE_TYPE_TEXT,
+     .offset = MHE_OPT_OFFSET(mhi_output_section, node_name, const char *)},
     MHE_OPT_BOOL(mhi_output_section, picture, 1,
                  "Draw estimated against reference, where gnuplot is installed."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
@@ -159,6 +176,7 @@ static const mhi_section sections[] = {
     SECTION("costs", "A list: what the estimate is to be close to.", MHE_COST_IFACE, cost_options,
             0),
     SECTION("solver", "How a window is solved.", MHE_SOLVER_IFACE, solver_options, AT(solver)),
+    SECTION("realtime", "Limits of live use.", NULL, realtime_options, AT(realtime)),
     SECTION("output", "What is made of the results.", NULL, output_options, AT(output)),
 };
 

@@ -24,7 +24,11 @@ mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
  * NULL) where it is not known. What the config itself gives is kept. */
 void mhi_estimator_set_start(mhe_estimator *estimator, const double *q, const double *qdot);
 /* The state the next window starts from, instead of what the last solution expects: x [n_x]. After
- * a push that was `ready`. */
+ * a push that was `ready`, before mhe_estimator_prepare. */
 void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
+/* Instead of what the config says: realtime.deadline_ms, here in s, 0: none; data.marker_outlier,
+ * m, 0: markers are wishes, and kept however far they are. */
+void mhi_estimator_set_deadline(mhe_estimator *estimator, double seconds);
+void mhi_estimator_set_outlier(mhe_estimator *estimator, double distance);
 
 #endif

@@ -7,13 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
                                     mhe_description **description, mhe_error *err) {
@@ -91,7 +84,7 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
                                .n_terms = run->n_costs,
                                .n_intervals = run->horizon.window,
                                .interval = 0.01 * run->horizon.ratio, /* until frames tell */
-                               .n_workers = 1};
+                               .n_workers = run->realtime.threads};
     status = mhi_ocp_create(&ocp, &e->ocp, err);
     if (status == MHE_OK) {
         status = mhi_solver_create(run->solver.plugin, e->host, mhi_ocp_face(e->ocp),
@@ -103,6 +96,13 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     return status;
 }
 
+/* Nothing is known of the first state. */
+void mhi_estimator_forget_start(mhe_estimator *e) {
+    for (int32_t i = 0; i < e->n_q; i++) {
+        e->start_q[i] = e->start_v[i] = NAN;
+    }
+}
+
 static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
     const int32_t nodes = e->n + 1;
     struct {
@@ -110,6 +110,10 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
         int32_t n;
     } wanted[] = {{&e->times, nodes},
                   {&e->markers, nodes * 3 * e->n_k},
+                  {&e->trusted, nodes * 3 * e->n_k},
+                  {&e->expected, 3 * e->n_k},
+                  {&e->distance, nodes},
+                  {&e->steps, e->n},
                   {&e->emg, nodes * e->n_m},
                   {&e->delay_line, (e->delay + 1) * e->n_m},
                   {&e->solution.x, nodes * e->n_x},
@@ -147,9 +151,7 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
     for (int32_t i = 0; i < e->n_m; i++) {
         e->no_emg[i] = NAN;
     }
-    for (int32_t i = 0; i < e->n_q; i++) {
-        e->start_q[i] = e->start_v[i] = NAN;
-    }
+    mhi_estimator_forget_start(e);
     e->solution.size = sizeof e->solution;
     e->last_time = -INFINITY;
     return MHE_OK;
@@ -192,6 +194,9 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
     e->solver = run->solver.plugin->ops;
     e->n = run->horizon.window;
     e->delay = run->data.emg_delay;
+    e->node = run->output.node;
+    e->outlier = run->data.marker_outlier;
+    e->budget = 1e-3 * run->realtime.deadline_ms;
     mhe_status status = mhi_estimator_read_model(run, host, &e->description, err);
     if (status == MHE_OK) {
         status = create_problem(e, err);
@@ -252,6 +257,16 @@ void mhi_estimator_set_start(mhe_estimator *e, const double *q, const double *qd
 
 void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
     memcpy(e->solution.x, x, sizeof(double) * (size_t)e->n_x);
+    e->settled = 1;
+    e->prepared = 0;
+}
+
+void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {
+    e->budget = seconds;
+}
+
+void mhi_estimator_set_outlier(mhe_estimator *e, double distance) {
+    e->outlier = distance;
 }
 
 void mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *info) {
@@ -269,97 +284,7 @@ void mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *info) {
                                  .muscle_names = p->muscle_names,
                                  .marker_names = p->marker_names,
                                  .solver = e->run->solver.plugin->id,
-                                 .config_name = e->run->name};
-}
-
-/* The EMG that a node at this frame tracks: that of `delay` frames ago, before that the first. */
-static const double *delayed_emg(mhe_estimator *e, const double *emg) {
-    const int32_t slots = e->delay + 1;
-    const int32_t put = (int32_t)(e->n_frames % slots), get = (int32_t)((e->n_frames + 1) % slots);
-    for (int32_t slot = 0; slot < slots; slot++) {
-        if (slot == put || e->n_frames == 0) {
-            memcpy(e->delay_line + slot * e->n_m, emg, sizeof(double) * (size_t)e->n_m);
-        }
-    }
-    return e->delay_line + get * e->n_m;
-}
-
-static double rms_distance(const double *a, const double *b, int32_t n, int32_t per_point) {
-    double squares = 0;
-    int32_t count = 0;
-    for (int32_t i = 0; i < n; i++) {
-        const double d = a[i] - b[i];
-        squares += isnan(d) ? 0 : d * d;
-        count += !isnan(d);
-    }
-    return count == 0 ? NAN : sqrt(per_point * squares / count);
-}
-
-/* Everything that is told about node 0. */
-static mhe_status give_estimate(mhe_estimator *e, mhe_estimate *out, mhe_error *err) {
-    const double *x = e->solution.x, *u = e->solution.u;
-    const int driven = e->n_x > 2 * e->n_q;
-    const double *a = driven ? x + 2 * e->n_q : u;
-    const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;
-    memcpy(e->out_q, x, n_q);
-    memcpy(e->out_v, x + e->n_q, n_q);
-    memcpy(e->out_activation, a, n_m);
-    memcpy(e->out_excitation, u, n_m);
-    memcpy(e->out_residual, u + e->n_m, sizeof(double) * (size_t)e->n_r);
-    mhi_muscle_state muscles;
-    mhi_system_context *context = mhi_ocp_context(e->ocp);
-    mhe_status status = mhi_system_muscles(context, x, x + e->n_q, a, 0, &muscles, err);
-    if (status == MHE_OK) {
-        memcpy(e->out_force, muscles.force, n_m);
-        memcpy(e->out_moment, muscles.moment, n_q);
-        status = mhi_system_markers(context, x, e->out_marker, NULL, err);
-    }
-    out->time = e->times[0];
-    out->marker_rms = rms_distance(e->out_marker, e->markers, 3 * e->n_k, 3);
-    out->emg_rms = rms_distance(u, e->emg, e->n_m, 1);
-    out->q = e->out_q;
-    out->qdot = e->out_v;
-    out->activation = e->out_activation;
-    out->excitation = driven ? e->out_excitation : NULL;
-    out->force = e->out_force;
-    out->moment = e->out_moment;
-    out->residual = e->out_residual;
-    out->markers = e->out_marker;
-    return status;
-}
-
-mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_estimate *estimate,
-                              int32_t *ready, mhe_error *err) {
-    const double begin = now();
-    *ready = 0;
-    if (!(frame->time > e->last_time) || !isfinite(frame->time)) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "frame time %g s does not follow %g s", frame->time,
-                        e->last_time);
-    }
-    e->last_time = frame->time;
-    const double *emg = delayed_emg(e, frame->emg == NULL ? e->no_emg : frame->emg);
-    const int used = e->n_frames++ % e->run->horizon.ratio == 0;
-    if (!used) {
-        return MHE_OK;
-    }
-    mhi_window_append(e, frame->time, frame->markers == NULL ? e->no_markers : frame->markers, emg);
-    if (e->filled <= e->n) {
-        return MHE_OK;
-    }
-    mhe_solve_info info = {.size = sizeof info};
-    *estimate = (mhe_estimate){.size = sizeof *estimate};
-    mhe_status status = mhi_window_prepare(e, err);
-    if (status == MHE_OK) {
-        mhi_window_solve(e, &info, &estimate->status);
-        status = give_estimate(e, estimate, err);
-    }
-    mhi_window_advance(e); /* in any case: the next frame needs its place */
-    if (status != MHE_OK) {
-        return status;
-    }
-    estimate->iterations = info.iterations;
-    estimate->kkt_residual = info.kkt_residual;
-    estimate->solve_time = now() - begin;
-    *ready = 1;
-    return MHE_OK;
+                                 .config_name = e->run->name,
+                                 .node = e->node,
+                                 .delay = (e->n - e->node) * p->interval};
 }

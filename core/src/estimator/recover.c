@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* recover.c: which measurements are believed, and when a window is given up.
+ *
+ * A marker further than `data.marker_outlier` (plus how far the markers are anyway) from where the
+ * model expects it is left out of the solves. A frame most of whose markers are so is implausible.
+ * LOST_FRAMES of them in a row are not the measurements' fault: the window has lost the motion. So
+ * it has after a whole window of failed solves. It then begins again from what was measured, as the
+ * first one did. */
+#include "estimator/estimator_private.h"
+
+#include <string.h>
+
+#define LOST_FRAMES 3
+
+double mhi_rms_distance(const double *a, const double *b, int32_t n, int32_t per_point) {
+    double squares = 0;
+    int32_t count = 0;
+    for (int32_t i = 0; i < n; i++) {
+        const double d = a[i] - b[i];
+        squares += isnan(d) ? 0 : d * d;
+        count += !isnan(d);
+    }
+    return count == 0 ? NAN : sqrt(per_point * squares / count);
+}
+
+void mhi_recover_screen(mhe_estimator *e) {
+    double *seen = mhi_row(e->trusted, e->n, 3 * e->n_k);
+    int32_t n_seen = 0, n_off = 0;
+    if (!(e->outlier > 0) || !e->settled) {
+        return;
+    }
+    for (int32_t i = 0; i < e->n_k; i++) {
+        const double far = mhi_rms_distance(seen + 3 * i, e->expected + 3 * i, 3, 3);
+        const int32_t off = far > e->outlier + e->fit;
+        n_seen += !isnan(far);
+        n_off += off;
+        for (int32_t axis = 0; axis < 3 && off; axis++) {
+            seen[3 * i + axis] = NAN;
+        }
+    }
+    if (n_seen > 0) {
+        e->implausible = 2 * n_off > n_seen ? e->implausible + 1 : 0;
+    }
+}
+
+int32_t mhi_recover_is_lost(const mhe_estimator *e) {
+    int32_t measured = 0; /* without markers there is nothing to begin from */
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)(e->n + 1) * 3 * e->n_k && !measured; i++) {
+        measured = !isnan(e->markers[i]);
+    }
+    return measured && (e->implausible >= LOST_FRAMES || e->predicted >= e->n);
+}
+
+void mhi_recover_begun(mhe_estimator *e) {
+    memcpy(e->trusted, e->markers, sizeof(double) * (size_t)((e->n + 1) * 3 * e->n_k));
+    e->implausible = e->predicted = 0;
+    e->fit = 0;
+}
+
+void mhi_recover_solved(mhe_estimator *e, int32_t frame_status) {
+    const int32_t failed = frame_status == MHE_FRAME_PREDICTED;
+    e->predicted = !failed ? 0 : e->predicted + e->settled; /* to settle may take its time */
+    if (failed || !(e->outlier > 0)) {
+        return;
+    }
+    if (mhi_system_markers(mhi_ocp_context(e->ocp), mhi_row(e->solution.x, e->n, e->n_x),
+                           e->expected, NULL, NULL) == MHE_OK) {
+        const double fit =
+            mhi_rms_distance(e->expected, mhi_row(e->trusted, e->n, 3 * e->n_k), 3 * e->n_k, 3);
+        e->fit = isnan(fit) ? e->fit : fit;
+    }
+}

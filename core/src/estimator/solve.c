@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* solve.c: solves a prepared window within its time, and says what came of it. */
+#include "estimator/estimator_private.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* A window that begins, see settle(). */
+#define FIRST_SOLVES 10    /* at most */
+#define FIRST_WEIGHT 100.0 /* of the proximal term on velocities and activations */
+#define FIRST_MOVE 0.02    /* 1, rad/s: so near to its centre the term no longer matters */
+
+/* An unfinished iterate is handed out only if it is a motion of the model: largest jump between
+ * intervals that may remain, rad, rad/s, 1. Else its states would start the next window and the
+ * error would stay. */
+#define CONSISTENT 1e-2
+
+static int all_finite(const double *values, ptrdiff_t n) {
+    for (ptrdiff_t i = 0; i < n; i++) {
+        if (!isfinite(values[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static void take_back_guess(mhe_estimator *e) {
+    memcpy(e->solution.x, e->guess_x, sizeof(double) * (size_t)(e->n + 1) * (size_t)e->n_x);
+    memcpy(e->solution.u, e->guess_u, sizeof(double) * (size_t)e->n * (size_t)e->n_u);
+    e->solution.has_multipliers = 0;
+}
+
+/* The model's own prediction from the first state under the guessed controls. */
+static void predict(mhe_estimator *e) {
+    take_back_guess(e);
+    for (int32_t k = 0; k < e->n; k++) {
+        double *next = mhi_row(e->solution.x, k + 1, e->n_x);
+        mhe_status status = mhi_ocp_predict(e->ocp, mhi_row(e->solution.x, k, e->n_x),
+                                            mhi_row(e->solution.u, k, e->n_u), next, NULL);
+        if (status != MHE_OK || !all_finite(next, e->n_x)) {
+            memcpy(next, mhi_row(e->guess_x, k + 1, e->n_x), sizeof(double) * (size_t)e->n_x);
+        }
+    }
+}
+
+/* The solver looks at its clock between iterations: it is told to stop one iteration before the
+ * time is over. How long one takes is learned, and forgotten again, so that one long one (the
+ * machine was busy) does not stop all that follow. */
+static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
+    const double begin = mhi_now();
+    const mhe_solve_control control = {.size = sizeof control,
+                                       .deadline = e->arrival + e->budget - e->per_iteration};
+    *info = (mhe_solve_info){.size = sizeof *info};
+    mhe_status status =
+        e->solver->solve(e->solver_self, e->budget > 0 ? &control : NULL, &e->solution, info, err);
+    const double each = info->iterations > 0 ? (mhi_now() - begin) / info->iterations : 0;
+    e->per_iteration = fmax(each, 0.7 * e->per_iteration);
+    return status;
+}
+
+static int32_t out_of_time(const mhe_estimator *e) {
+    return e->budget > 0 && mhi_now() >= e->arrival + e->budget - e->per_iteration;
+}
+
+/* Largest change of a velocity or activation of the first state. */
+static double first_state_move(const mhe_estimator *e, const double *before) {
+    double move = 0;
+    for (int32_t i = e->n_q; i < e->n_x; i++) {
+        move = fmax(move, fabs(e->solution.x[i] - before[i]));
+    }
+    return move;
+}
+
+static void set_proximal_weight(mhe_estimator *e, double factor) {
+    for (int32_t i = e->n_q; i < e->n_x; i++) {
+        e->prior_weight[i] = factor == 0      ? 0
+                             : e->rounds == 0 ? FIRST_WEIGHT
+                                              : factor * e->prior_weight[i];
+    }
+    mhi_ocp_set_prior(e->ocp, e->prior_centre, e->prior_weight);
+}
+
+/* With its first state free the window hardly determines the first activations: full Gauss-Newton
+ * steps then run to and fro. A proximal term, whose centre follows the solution until both agree,
+ * makes each solve well posed and vanishes from the last (proximal point method: Rockafellar 1976,
+ * doi:10.1137/0314056). Where the time is over before, the next frame's window goes on from there,
+ * its first state still free: so the deadline holds for these frames, too. */
+static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    int32_t iterations = 0, cut = 0;
+    double factor = 1;
+    while (!e->settled && !cut && status == MHE_OK) {
+        memcpy(e->prior_centre, e->solution.x, sizeof(double) * (size_t)e->n_x);
+        set_proximal_weight(e, factor);
+        status = solve_once(e, info, err);
+        iterations += info->iterations;
+        const int32_t converged = status == MHE_OK && info->outcome == MHE_SOLVE_CONVERGED;
+        const int32_t over = status == MHE_OK && info->outcome == MHE_SOLVE_DEADLINE;
+        e->rounds += !over;
+        factor = converged || over ? 1 : 10;
+        e->settled = (converged && first_state_move(e, e->prior_centre) < FIRST_MOVE) ||
+                     e->rounds >= FIRST_SOLVES || status != MHE_OK;
+        cut = over || out_of_time(e);
+    }
+    if (cut && !e->settled && info->outcome == MHE_SOLVE_CONVERGED) {
+        info->outcome = MHE_SOLVE_DEADLINE; /* of what is not yet the last round */
+    }
+    if (e->settled) {
+        set_proximal_weight(e, 0);
+    }
+    info->iterations = iterations;
+    return status;
+}
+
+/* A solver that cannot compute at all (its linear solver is not installed) does so at every frame:
+ * it is told once. */
+static void tell_failure(mhe_estimator *e, const char *why) {
+    if (!e->failure_told) {
+        char line[MHE_ERROR_TEXT + 64];
+        (void)snprintf(line, sizeof line, "%s: from %g s on: %s", e->run->solver.plugin->id,
+                       e->times[0], why);
+        e->host->log(e->host, MHE_LOG_WARNING, line);
+        e->failure_told = 1;
+    }
+}
+
+static int32_t status_of(const mhe_estimator *e, int32_t outcome) {
+    switch (outcome) {
+    case MHE_SOLVE_CONVERGED:
+        return e->restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_OK;
+    case MHE_SOLVE_ITERATION_LIMIT:
+        return e->restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_ITERATION_LIMIT;
+    case MHE_SOLVE_DEADLINE:
+        return e->restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_DEADLINE;
+    default:
+        return MHE_FRAME_PREDICTED;
+    }
+}
+
+void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status) {
+    mhe_error why = {0};
+    memcpy(e->guess_x, e->solution.x, sizeof(double) * (size_t)(e->n + 1) * (size_t)e->n_x);
+    memcpy(e->guess_u, e->solution.u, sizeof(double) * (size_t)e->n * (size_t)e->n_u);
+    const mhe_status status = (e->settled ? solve_once : settle)(e, info, &why);
+    if (status != MHE_OK) {
+        tell_failure(e, why.text);
+    }
+    const int finite = all_finite(e->solution.x, (ptrdiff_t)(e->n + 1) * e->n_x) &&
+                       all_finite(e->solution.u, (ptrdiff_t)e->n * e->n_u);
+    const int usable = status == MHE_OK && finite && info->primal_residual <= CONSISTENT;
+    *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;
+    if (*frame_status != MHE_FRAME_PREDICTED) {
+        e->restarted = 0;
+    } else if (e->settled) {
+        predict(e);
+    } else if (!finite) { /* else what was reached in the time starts the next frame's solve */
+        take_back_guess(e);
+    }
+    e->solved++;
+}
