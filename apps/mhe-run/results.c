@@ -2,86 +2,172 @@
 #include "results.h"
 
 #include "base/arena.h"
+#include "matlab.h"
 
 #include <string.h>
 
+#define MOST_SINKS 2
+
+/* One table in all its formats. */
+typedef struct series {
+    mhi_sink *sinks[MOST_SINKS];
+    int32_t n_sinks;
+    matlab_table *table; /* NULL: none */
+} series;
+
 struct results {
     mhe_estimator_info info;
-    mhi_sink *estimates, *forces, *markers, *torques, *quality;
+    series estimates, motion, forces, markers, torques, quality;
+    matlab *matlab; /* NULL: no such file */
+    int32_t csv;
     double *row; /* of the widest file */
     mhi_arena arena;
 };
 
-/* Appends "<prefix><name>" for each name. */
-static int add_labels(results *r, const char **labels, int32_t *n, const char *prefix,
-                      const char *const *names, int32_t n_names) {
-    for (int32_t i = 0; i < n_names; i++) {
-        labels[*n] = mhi_arena_format(&r->arena, "%s%s", prefix, names[i]);
-        if (labels[(*n)++] == NULL) {
-            return -1;
+/* A list of column names. */
+typedef struct names {
+    results *owner;
+    const char **list;
+    int32_t n, failed;
+} names;
+
+/* Appends "<prefix><name><suffix>" for each name. */
+static void add_names(names *to, const char *prefix, const char *const *list, int32_t n,
+                      const char *suffix) {
+    for (int32_t i = 0; i < n && !to->failed; i++) {
+        const char *name = mhi_arena_format(&to->owner->arena, "%s%s%s", prefix, list[i], suffix);
+        to->failed = name == NULL;
+        to->list[to->n++] = name;
+    }
+}
+
+/* Everything but the .sto or .trc. */
+static mhe_status open_others(results *r, mhi_outbox *outbox, const char *name, const names *labels,
+                              series *s, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    if (labels->failed) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    if (r->csv) {
+        char file[64];
+        (void)snprintf(file, sizeof file, "%s.csv", name);
+        status = mhi_sink_csv(outbox, file, labels->list, labels->n, &s->sinks[s->n_sinks], err);
+        s->n_sinks += status == MHE_OK;
+    }
+    if (status == MHE_OK && r->matlab != NULL) {
+        status = matlab_add(r->matlab, name, labels->list, labels->n, &s->table, err);
+    }
+    return status;
+}
+
+static mhe_status open_series(results *r, mhi_outbox *outbox, const char *name, const char *title,
+                              const names *labels, series *s, mhe_error *err) {
+    char file[64];
+    (void)snprintf(file, sizeof file, "%s.sto", name);
+    mhe_status status = labels->failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                       : mhi_sink_sto(outbox, file, title, labels->list, labels->n,
+                                                      &s->sinks[0], err);
+    s->n_sinks = status == MHE_OK;
+    return status == MHE_OK ? open_others(r, outbox, name, labels, s, err) : status;
+}
+
+static mhe_status open_states(results *r, mhi_outbox *outbox, names *labels, mhe_error *err) {
+    const mhe_estimator_info *f = &r->info;
+    add_names(labels, "q_", f->coordinate_names, f->n_q, "");
+    add_names(labels, "qdot_", f->coordinate_names, f->n_q, "");
+    add_names(labels, "a_", f->muscle_names, f->n_muscles, "");
+    if (f->formulation == 0) {
+        add_names(labels, "e_", f->muscle_names, f->n_muscles, "");
+    }
+    mhe_status status =
+        open_series(r, outbox, "estimates", "estimates", labels, &r->estimates, err);
+    labels->n = 0;
+    add_names(labels, "", f->coordinate_names, f->n_q, "");
+    add_names(labels, "", f->muscle_names, f->n_muscles, ".activation");
+    if (status == MHE_OK && !labels->failed) { /* what the OpenSim GUI shows on the model */
+        status = mhi_sink_sto(outbox, "motion.sto", "motion", labels->list, labels->n,
+                              &r->motion.sinks[0], err);
+        r->motion.n_sinks = status == MHE_OK;
+    }
+    return status;
+}
+
+static mhe_status open_markers(results *r, mhi_outbox *outbox, const mhi_recording *recording,
+                               names *labels, mhe_error *err) {
+    static const char *const axes[] = {"_x", "_y", "_z"};
+    const mhe_estimator_info *f = &r->info;
+    labels->n = 0;
+    for (int32_t i = 0; i < 3 * f->n_markers; i++) {
+        add_names(labels, "", &f->marker_names[i / 3], 1, axes[i % 3]);
+    }
+    mhe_status status = mhi_sink_trc(outbox, "markers.trc", f->marker_names, f->n_markers,
+                                     recording->rate / f->ratio, recording->unit,
+                                     recording->unit_name, &r->markers.sinks[0], err);
+    r->markers.n_sinks = status == MHE_OK;
+    return status == MHE_OK ? open_others(r, outbox, "markers", labels, &r->markers, err) : status;
+}
+
+static mhe_status open_all(results *r, mhi_outbox *outbox, const mhi_recording *recording,
+                           const char **room, mhe_error *err) {
+    static const char *quality[] = {"status",   "iterations", "kkt_residual",
+                                    "solve_ms", "marker_rms", "emg_rms"};
+    const mhe_estimator_info *f = &r->info;
+    names labels = {.owner = r, .list = room};
+    mhe_status status = open_states(r, outbox, &labels, err);
+    labels.n = 0;
+    add_names(&labels, "", f->muscle_names, f->n_muscles, "");
+    if (status == MHE_OK) {
+        status = open_series(r, outbox, "forces", "muscle forces (N)", &labels, &r->forces, err);
+    }
+    labels.n = 0;
+    add_names(&labels, "moment_", f->coordinate_names, f->n_q, "");
+    add_names(&labels, "residual_", f->coordinate_names, f->n_residual_torques, "");
+    if (status == MHE_OK) {
+        status =
+            open_series(r, outbox, "torques", "joint moments by muscles, residual torques (N m)",
+                        &labels, &r->torques, err);
+    }
+    if (status == MHE_OK) {
+        status = open_markers(r, outbox, recording, &labels, err);
+    }
+    const names of_quality = {.owner = r, .list = quality, .n = 6};
+    return status == MHE_OK ? open_series(r, outbox, "quality", "quality of each estimate",
+                                          &of_quality, &r->quality, err)
+                            : status;
+}
+
+static int32_t is_among(const mhe_text_list *list, const char *name) {
+    for (int32_t i = 0; i < list->n; i++) {
+        if (strcmp(list->values[i], name) == 0) {
+            return 1;
         }
     }
     return 0;
 }
 
-static mhe_status open_sinks(results *r, mhi_outbox *outbox, const mhi_recording *recording,
-                             const char **labels, mhe_error *err) {
-    static const char *const quality[] = {"status",   "iterations", "kkt_residual",
-                                          "solve_ms", "marker_rms", "emg_rms"};
-    const mhe_estimator_info *f = &r->info;
-    const int driven = f->formulation == 0;
-    int32_t n = 0;
-    if (add_labels(r, labels, &n, "q_", f->coordinate_names, f->n_q) != 0 ||
-        add_labels(r, labels, &n, "qdot_", f->coordinate_names, f->n_q) != 0 ||
-        add_labels(r, labels, &n, "a_", f->muscle_names, f->n_muscles) != 0 ||
-        (driven && add_labels(r, labels, &n, "e_", f->muscle_names, f->n_muscles) != 0)) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    mhe_status status =
-        mhi_sink_sto(outbox, "estimates.sto", "estimates", labels, n, &r->estimates, err);
-    if (status == MHE_OK) {
-        status = mhi_sink_sto(outbox, "forces.sto", "muscle forces (N)", f->muscle_names,
-                              f->n_muscles, &r->forces, err);
-    }
-    n = 0;
-    if (add_labels(r, labels, &n, "moment_", f->coordinate_names, f->n_q) != 0 ||
-        add_labels(r, labels, &n, "residual_", f->coordinate_names, f->n_residual_torques) != 0) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    if (status == MHE_OK) {
-        status =
-            mhi_sink_sto(outbox, "torques.sto", "joint moments by muscles, residual torques (N m)",
-                         labels, n, &r->torques, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_sink_trc(outbox, "markers.trc", f->marker_names, f->n_markers,
-                              recording->rate / f->ratio, recording->unit, recording->unit_name,
-                              &r->markers, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_sink_sto(outbox, "quality.sto", "quality of each estimate", quality, 6,
-                              &r->quality, err);
-    }
-    return status;
-}
-
 mhe_status results_open(mhi_outbox *outbox, const mhe_estimator_info *info,
-                        const mhi_recording *recording, results **result, mhe_error *err) {
+                        const mhi_recording *recording, const mhe_text_list *formats,
+                        results **result, mhe_error *err) {
     *result = NULL;
     mhi_arena arena = {0};
-    const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 6;
+    const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers + 6;
     results *r = MHI_TAKE(&arena, results, 1);
-    const char **labels = MHI_TAKE(&arena, const char *, widest);
+    const char **room = MHI_TAKE(&arena, const char *, widest);
     if (r != NULL) {
         r->info = *info;
+        r->csv = is_among(formats, "csv");
         r->row = MHI_TAKE(&arena, double, widest);
         r->arena = arena;
     }
-    if (r == NULL || labels == NULL || r->row == NULL) {
+    if (r == NULL || room == NULL || r->row == NULL) {
         mhi_arena_free(&arena);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    mhe_status status = open_sinks(r, outbox, recording, labels, err);
+    mhe_status status =
+        is_among(formats, "mat") ? matlab_open(outbox, "results.mat", &r->matlab, err) : MHE_OK;
+    if (status == MHE_OK) {
+        status = open_all(r, outbox, recording, room, err);
+    }
     if (status != MHE_OK) {
         results_close(r);
         return status;
@@ -103,6 +189,14 @@ static int32_t put(results *r, int32_t at, const double *values, int32_t n) {
     return at + n;
 }
 
+static mhe_status write_row(const series *s, double time, const double *values, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < s->n_sinks && status == MHE_OK; i++) {
+        status = mhi_sink_row(s->sinks[i], time, values, err);
+    }
+    return status == MHE_OK && s->table != NULL ? matlab_row(s->table, time, values, err) : status;
+}
+
 mhe_status results_write(results *r, const mhe_estimate *e, mhe_error *err) {
     const mhe_estimator_info *f = &r->info;
     int32_t n = put(r, 0, e->q, f->n_q);
@@ -111,22 +205,26 @@ mhe_status results_write(results *r, const mhe_estimate *e, mhe_error *err) {
     if (e->excitation != NULL) {
         (void)put(r, n, e->excitation, f->n_muscles);
     }
-    mhe_status status = mhi_sink_row(r->estimates, e->time, r->row, err);
+    mhe_status status = write_row(&r->estimates, e->time, r->row, err);
     if (status == MHE_OK) {
-        status = mhi_sink_row(r->forces, e->time, e->force, err);
+        (void)put(r, put(r, 0, e->q, f->n_q), e->activation, f->n_muscles);
+        status = write_row(&r->motion, e->time, r->row, err);
     }
     if (status == MHE_OK) {
-        status = mhi_sink_row(r->markers, e->time, e->markers, err);
+        status = write_row(&r->forces, e->time, e->force, err);
+    }
+    if (status == MHE_OK) {
+        status = write_row(&r->markers, e->time, e->markers, err);
     }
     if (status == MHE_OK) {
         n = put(r, 0, e->moment, f->n_q);
         (void)put(r, n, e->residual, f->n_residual_torques);
-        status = mhi_sink_row(r->torques, e->time, r->row, err);
+        status = write_row(&r->torques, e->time, r->row, err);
     }
     if (status == MHE_OK) {
         const double quality[] = {e->status,           e->iterations, e->kkt_residual,
                                   1e3 * e->solve_time, e->marker_rms, e->emg_rms};
-        status = mhi_sink_row(r->quality, e->time, quality, err);
+        status = write_row(&r->quality, e->time, quality, err);
     }
     return status;
 }

@@ -10,9 +10,12 @@
 
 typedef struct results results;
 
-/* Opens estimates.sto, forces.sto, markers.trc, torques.sto and quality.sto in the outbox. */
+/* Opens estimates, forces, torques and quality (.sto), markers.trc and motion.sto in the outbox;
+ * with "csv" among the formats the same as .csv, with "mat" in results.mat. Markers there are in m.
+ */
 mhe_status results_open(mhi_outbox *outbox, const mhe_estimator_info *info,
-                        const mhi_recording *recording, results **result, mhe_error *err);
+                        const mhi_recording *recording, const mhe_text_list *formats,
+                        results **result, mhe_error *err);
 mhe_status results_write(results *result, const mhe_estimate *estimate, mhe_error *err);
 void results_close(results *result);
 

@@ -50,7 +50,8 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         status = mhi_outbox_open(s->out, &t->outbox, err);
     }
     if (status == MHE_OK && !s->check_only) {
-        status = results_open(t->outbox, &t->summary.info, t->recording, &t->results, err);
+        status = results_open(t->outbox, &t->summary.info, t->recording, &s->run->output.formats,
+                              &t->results, err);
     }
     return status;
 }

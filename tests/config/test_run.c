@@ -151,7 +151,7 @@ static void electrodes_of_the_file(void **state) {
     release(&o);
 }
 
-static void bad_electrodes(void **state) {
+static void bad_electrodes_and_formats(void **state) {
     (void)state;
     assert_refused(BASE COSTS "emg: {low_pass: 4}\n",
                    ":7: emg: 'channels' is missing, the list of electrodes: [{name: COLUMN, "
@@ -178,7 +178,10 @@ static void bad_electrodes(void **state) {
     assert_refused(BASE COSTS "data: {emg: e.sto}\n"
                               "emg: {band_low: 500, channels: [{name: a, muscles: x}]}\n",
                    ":8: emg: 'band_low' is 500 Hz, which is not below 'band_high', 450 Hz");
-    struct outcome o = read_good(BASE COSTS "emg:\n", NULL, 0);
+    assert_refused(BASE COSTS "output: {formats: [mat, cvs]}\n",
+                   ":7: output: 'formats' cannot hold 'cvs' (did you mean 'csv'?)");
+    struct outcome o = read_good(BASE COSTS "emg:\noutput: {formats: mat}\n", NULL, 0);
+    assert_int_equal(o.run->output.formats.n, 1);
     assert_int_equal(o.run->emg.n_channels, 0);
     release(&o);
 }
@@ -397,7 +400,7 @@ static void tables_are_documented(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(electrodes_of_the_file),
-        cmocka_unit_test(bad_electrodes),
+        cmocka_unit_test(bad_electrodes_and_formats),
         cmocka_unit_test(defaults_of_the_core),
         cmocka_unit_test(values_of_the_file),
         cmocka_unit_test(assignments),

@@ -345,7 +345,8 @@ static mhe_status check_run(const struct reader *r) {
     if (run->emg.delay < 0) {
         run->emg.delay = by_activation ? 0.02 : 0;
     }
-    return read_node(r);
+    const mhe_status status = mhi_run_check_formats(run, r->err);
+    return status == MHE_OK ? read_node(r) : status;
 }
 
 /* The tree, then all sections or those of a scope. */

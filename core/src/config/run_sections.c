@@ -147,6 +147,8 @@ static const mhe_option output_options[] = {
      .offset = MHE_OPT_OFFSET(mhi_output_section, node_name, const char *)},
     MHE_OPT_BOOL(mhi_output_section, picture, 1,
                  "Draw estimated against reference, where gnuplot is installed."),
+    MHE_OPT_TEXTS(mhi_output_section, formats, 0,
+                  "Formats of the results beside .sto: csv, mat (MATLAB, all in results.mat)."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
                 "Estimates at the start that the errors in summary.json leave out."),
     MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",

@@ -24,4 +24,7 @@ mhe_status mhi_run_read_channels(mhi_run *run, mhe_error *err);
 /* That list as YAML, within its section. */
 void mhi_run_write_channels(const mhi_run *run, mhi_text *out);
 
+/* Is every output.formats one that there is? (run_output.c). [cold] */
+mhe_status mhi_run_check_formats(const mhi_run *run, mhe_error *err);
+
 #endif

@@ -17,7 +17,7 @@ struct mhi_sink {
     char *first_line;
     mhi_text header[3]; /* its further text; the number of rows stands between the parts */
     int32_t n_counts;   /* how often: parts - 1 */
-    int32_t is_trc;
+    int32_t is_trc, is_csv;
     int32_t n_rows, n_columns;
     double unit; /* metres per unit written */
 };
@@ -29,7 +29,8 @@ static mhe_status write_header(const mhi_sink *sink, mhe_error *err) {
     int32_t digits = snprintf(count, sizeof count, "%d", sink->n_rows);
     int32_t pad = sink->n_counts * (COUNT_DIGITS - digits);
     FILE *out = sink->file->stream;
-    int failed = fprintf(out, "%s%*s\n%s", sink->first_line, pad, "", sink->header[0].data) < 0;
+    const char *head = sink->header[0].data == NULL ? "" : sink->header[0].data;
+    int failed = fprintf(out, "%s%*s\n%s", sink->first_line, pad, "", head) < 0;
     for (int32_t i = 0; i < sink->n_counts && !failed; i++) {
         failed = fprintf(out, "%s%s", count, sink->header[i + 1].data) < 0;
     }
@@ -141,17 +142,47 @@ mhe_status mhi_sink_trc(mhi_outbox *outbox, const char *name, const char *const 
     return open_sink(outbox, name, made, sink, err);
 }
 
+/* A label in quotes where it holds what would end it. */
+static void add_csv_label(mhi_text *line, const char *label) {
+    if (strpbrk(label, ",\"\n\r") == NULL) {
+        mhi_text_add(line, ",%s", label);
+        return;
+    }
+    mhi_text_add(line, ",\"");
+    for (; *label != '\0'; label++) {
+        mhi_text_add(line, *label == '"' ? "\"\"" : "%c", *label);
+    }
+    mhi_text_add(line, "\"");
+}
+
+mhe_status mhi_sink_csv(mhi_outbox *outbox, const char *name, const char *const *labels,
+                        int32_t n_columns, mhi_sink **sink, mhe_error *err) {
+    *sink = NULL;
+    mhi_sink *made = new_sink(n_columns, 0);
+    if (made == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
+    }
+    mhi_text line = {0};
+    mhi_text_add(&line, "time");
+    for (int32_t i = 0; i < n_columns; i++) {
+        add_csv_label(&line, labels[i]);
+    }
+    made->header[0].failed = line.failed;
+    made->first_line = line.data;
+    made->is_csv = 1;
+    return open_sink(outbox, name, made, sink, err);
+}
+
 mhe_status mhi_sink_row(mhi_sink *sink, double time, const double *values, mhe_error *err) {
     FILE *out = sink->file->stream;
     mhi_c_locale locale = mhi_c_locale_begin();
     int failed = sink->is_trc ? fprintf(out, "%d\t%.10g", sink->n_rows + 1, time) < 0
                               : fprintf(out, "%.10g", time) < 0;
+    const char separator = sink->is_csv ? ',' : '\t';
+    const char *missing = sink->is_trc ? "" : sink->is_csv ? "NaN" : "nan";
     for (int32_t i = 0; i < sink->n_columns && !failed; i++) {
-        if (!isnan(values[i])) {
-            failed = fprintf(out, "\t%.12g", values[i] / sink->unit) < 0;
-        } else {
-            failed = fputs(sink->is_trc ? "\t" : "\tnan", out) < 0;
-        }
+        failed = isnan(values[i]) ? fprintf(out, "%c%s", separator, missing) < 0
+                                  : fprintf(out, "%c%.12g", separator, values[i] / sink->unit) < 0;
     }
     failed = failed || fputc('\n', out) == EOF || ferror(out);
     mhi_c_locale_end(locale);

@@ -28,6 +28,9 @@ mhe_status mhi_sink_sto(mhi_outbox *outbox, const char *name, const char *title,
 mhe_status mhi_sink_trc(mhi_outbox *outbox, const char *name, const char *const *markers,
                         int32_t n_markers, double rate, double unit, const char *unit_name,
                         mhi_sink **sink, mhe_error *err);
+/* A .csv with `time` and these labels in its first line; NaN is NaN. [cold] */
+mhe_status mhi_sink_csv(mhi_outbox *outbox, const char *name, const char *const *labels,
+                        int32_t n_columns, mhi_sink **sink, mhe_error *err);
 /* Appends a row: [n_columns] or [3 n_markers]; NaN is written as nan (.sto) or left empty (.trc).
  * Rows are buffered: MHE_E_IO may come some rows late, but never later than the commit. */
 mhe_status mhi_sink_row(mhi_sink *sink, double time, const double *values, mhe_error *err);
