@@ -80,14 +80,17 @@ static void add_times(cJSON *root, const summary *s) {
     add_number(ms, "max", percentile(s, 1));
 }
 
-/* Where raw EMG was processed: what that takes. */
-static void add_emg(cJSON *root, const mhi_emg_report *emg) {
+/* Where raw EMG was processed: what that takes. The latency is that of what the muscles do: to the
+ * estimate, with the window, the filters and a median solve. */
+static void add_emg(cJSON *root, const summary *s) {
+    const mhi_emg_report *emg = &s->emg;
     cJSON *o = cJSON_AddObjectToObject(root, "emg");
     add_number(o, "channels", emg->n_channels);
     add_number(o, "rate_hz", emg->rate);
     add_number(o, "offset_ms", 1e3 * emg->offset);
     add_number(o, "filter_delay_ms", 1e3 * emg->filter_delay);
     add_number(o, "lag_ms", 1e3 * emg->lag);
+    add_number(o, "latency_ms", 1e3 * (s->info.delay + emg->lag) + percentile(s, 0.5));
 }
 
 mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
@@ -114,7 +117,7 @@ mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error
     add_number(root, "deadline_misses", s->n_deadline);
     add_number(root, "peak_rss_mb", peak_rss_mb());
     if (s->emg.n_channels > 0) {
-        add_emg(root, &s->emg);
+        add_emg(root, s);
     }
     if (s->has_rmse) {
         add_rmse(root, &s->rmse);

@@ -100,6 +100,7 @@ static mhe_status write_texts(tracking *t, mhe_error *err) {
         t->summary.has_rmse = 1;
         mhi_errors_rmse(t->errors, run->output.skip_first, run->output.skip_last, &t->summary.rmse);
     }
+    mhe_estimator_describe(t->estimator, &t->summary.info); /* the interval is known now */
     mhi_run_write(run, &text);
     mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                                     : mhi_outbox_text(t->outbox, "config.yaml", text.data, err);

@@ -1,35 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "emg/electrodes.h"
+#include "emg/electrodes_private.h"
 
 #include "base/text.h"
-#include "emg/envelope.h"
-#include "io/motion_file.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define SAME_TIME 5e-7 /* s: files print times with six digits */
-#define KEPT 1.0       /* s of samples that stay at hand */
-#define STALE 0.01     /* s that a value lives beyond the next sample's turn */
-
-typedef struct wire { /* from a channel to a muscle */
-    int32_t channel, muscle;
-    double factor;
-} wire;
-
-struct mhi_electrodes {
-    int32_t n_channels, n_muscles, n_wires, capacity;
-    int32_t *column; /* [n_channels] of the raw sample */
-    wire *wires;
-    mhi_envelope *envelope;
-    double rate, offset, max;
-    double shift, lag;           /* s */
-    double *raw, *scale, *peaks; /* [n_channels]; peaks of scaled values, before the cut */
-    double *times, *values;      /* rings [capacity], [capacity x n_channels] */
-    int64_t n_pushed;
-    mhi_arena arena;
-};
+#define KEPT 1.0   /* s of samples that stay at hand */
+#define STALE 0.01 /* s that a value lives beyond the next sample's turn */
 
 /* ---- names ---- */
 
@@ -50,9 +29,8 @@ static int32_t find_name(const char *const *names, int32_t n, const char *name) 
     return -1;
 }
 
-/* Columns of the channels among labels. */
-static mhe_status find_columns(const mhi_run *run, const char *source, const char *const *labels,
-                               int32_t n_labels, int32_t *column, mhe_error *err) {
+mhe_status mhi_electrodes_columns(const mhi_run *run, const char *source, const char *const *labels,
+                                  int32_t n_labels, int32_t *column, mhe_error *err) {
     union {
         const char *const *lent;
         char **owned;
@@ -65,6 +43,12 @@ static mhe_status find_columns(const mhi_run *run, const char *source, const cha
             char hint[256];
             return mhe_fail(err, MHE_E_INPUT, "%s: no column for the channel '%s'%s", source, name,
                             mhi_suggest(hint, sizeof hint, name, labels, n_labels));
+        }
+        for (int32_t k = 0; k < i; k++) {
+            if (column[k] == column[i]) {
+                return mhe_fail(err, MHE_E_INPUT, "%s: the channels '%s' and '%s' are one column",
+                                source, run->emg.channels[k].name, name);
+            }
         }
     }
     return MHE_OK;
@@ -145,7 +129,7 @@ mhe_status mhi_electrodes_open(const mhi_run *run, const mhe_description *model,
     mhe_status status = e->column == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                                           : lay_wires(e, run, model, err);
     if (status == MHE_OK) {
-        status = find_columns(run, source, labels, n_labels, e->column, err);
+        status = mhi_electrodes_columns(run, source, labels, n_labels, e->column, err);
     }
     if (status == MHE_OK) {
         status = mhi_envelope_create(o, e->n_channels, rate, &e->envelope, &why);
@@ -221,7 +205,7 @@ static int32_t newest_before(const mhi_electrodes *e, double time) {
     const int64_t none = low;
     while (high - low > 1) {
         const int64_t middle = low + (high - low) / 2;
-        if (e->times[middle % e->capacity] <= time + SAME_TIME) {
+        if (e->times[middle % e->capacity] <= time + MHI_SAME_TIME) {
             low = middle;
         } else {
             high = middle;
@@ -241,145 +225,4 @@ void mhi_electrodes_at(const mhi_electrodes *e, double time, double *emg) {
         const double value = e->values[(ptrdiff_t)slot * e->n_channels + w->channel] * w->factor;
         emg[w->muscle] = isnan(value) ? NAN : fmin(fmax(value, 0), e->max);
     }
-}
-
-/* ---- recordings ---- */
-
-/* Columns of the channels replaced by their envelopes, where these look ahead. */
-static mhe_status smooth_whole(const mhi_run *run, mhi_table *table, const int32_t *column,
-                               mhe_error *err) {
-    double *signal = malloc(sizeof(double) * ((size_t)table->n_rows + 1));
-    mhe_status status = signal == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
-    for (int32_t i = 0; i < run->emg.n_channels && status == MHE_OK; i++) {
-        double *values = table->values + column[i];
-        mhe_error why = {0};
-        for (int32_t k = 0; k < table->n_rows; k++) {
-            signal[k] = values[(ptrdiff_t)k * table->n_columns];
-        }
-        status = mhi_envelope_zero_phase(&run->emg, table->rate, signal, table->n_rows, &why);
-        if (status != MHE_OK) {
-            (void)mhe_fail(err, status, "%s: %s", table->path, why.text);
-        }
-        for (int32_t k = 0; k < table->n_rows; k++) {
-            values[(ptrdiff_t)k * table->n_columns] = signal[k];
-        }
-    }
-    free(signal);
-    return status;
-}
-
-/* Opens electrodes on a table; a run that looks ahead gets its envelopes here. */
-static mhe_status open_on(const mhi_run *run, const mhe_description *model, mhi_table *table,
-                          const double *mvc, mhi_electrodes **e, mhe_error *err) {
-    const char *const *labels = (const char *const *)table->labels;
-    mhe_status status = mhi_electrodes_open(run, model, table->path, labels, table->n_labels,
-                                            table->rate, mvc, e, err);
-    if (status != MHE_OK || !run->emg.process || !run->emg.zero_phase) {
-        return status;
-    }
-    status = smooth_whole(run, table, (*e)->column, err);
-    mhi_electrodes_close(*e);
-    *e = NULL;
-    mhi_run ready = *run;
-    ready.emg.process = 0;
-    return status == MHE_OK ? mhi_electrodes_open(&ready, model, table->path, labels,
-                                                  table->n_labels, table->rate, mvc, e, err)
-                            : status;
-}
-
-/* Largest envelope of each channel in the file of maximal contractions, or its only row. */
-static mhe_status read_mvc_file(const mhi_run *run, const mhe_description *model, double *mvc,
-                                mhe_error *err) {
-    mhi_run plain = *run;
-    mhi_emg_channel *channels = malloc(sizeof *channels * (size_t)run->emg.n_channels);
-    double *ones = malloc(sizeof(double) * (size_t)run->emg.n_channels);
-    mhi_table *table = NULL;
-    mhi_electrodes *e = NULL;
-    mhe_status status = channels == NULL || ones == NULL
-                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_signals_read(run->emg.mvc_file, &table, err);
-    if (status == MHE_OK) {
-        for (int32_t i = 0; i < run->emg.n_channels; i++) {
-            channels[i] = run->emg.channels[i];
-            channels[i].gain = ones[i] = 1;
-        }
-        plain.emg.channels = channels;
-        plain.emg.process = run->emg.process && table->n_rows > 1;
-        table->rate = table->n_rows > 1 ? table->rate : 1;
-        status = open_on(&plain, model, table, ones, &e, err);
-    }
-    for (int32_t k = 0; k < (status == MHE_OK ? table->n_rows : 0); k++) {
-        mhi_electrodes_push(e, table->time[k], table->values + (ptrdiff_t)k * table->n_columns);
-    }
-    for (int32_t i = 0; i < run->emg.n_channels && status == MHE_OK; i++) {
-        if (run->emg.channels[i].mvc > 0) {
-            continue;
-        }
-        mvc[i] = e->peaks[i];
-        if (!(mvc[i] > 0)) {
-            status = mhe_fail(err, MHE_E_INPUT, "%s: channel '%s' shows no contraction",
-                              run->emg.mvc_file, run->emg.channels[i].name);
-        }
-    }
-    mhi_electrodes_close(e);
-    mhi_table_free(table);
-    free(channels);
-    free(ones);
-    return status;
-}
-
-static mhe_status find_mvc(const mhi_run *run, const mhe_description *model, double *mvc,
-                           mhe_error *err) {
-    int32_t open = 0;
-    for (int32_t i = 0; i < run->emg.n_channels; i++) {
-        const double given = run->emg.channels[i].mvc;
-        mvc[i] = given > 0 ? given : 1;
-        open += given <= 0;
-    }
-    return open > 0 && run->emg.mvc_file != NULL ? read_mvc_file(run, model, mvc, err) : MHE_OK;
-}
-
-mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
-                               const double *time, int32_t n_frames, double *emg,
-                               int32_t *n_muscles_found, mhi_emg_report *report,
-                               const mhe_host *host, mhe_error *err) {
-    mhi_electrodes *e = NULL;
-    double *mvc = calloc((size_t)run->emg.n_channels + 1, sizeof *mvc);
-    mhe_status status = mvc == NULL
-                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_emg_check_times(table, run->data.emg_offset, time, n_frames, err);
-    if (status == MHE_OK) {
-        status = find_mvc(run, model, mvc, err);
-    }
-    if (status == MHE_OK) {
-        int32_t *column = calloc((size_t)run->emg.n_channels + 1, sizeof *column);
-        status = column == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                : find_columns(run, table->path, (const char *const *)table->labels,
-                                               table->n_labels, column, err);
-        if (status == MHE_OK) {
-            mhi_electrodes_check_raw(run, table, column, host);
-        }
-        free(column);
-    }
-    if (status == MHE_OK) {
-        status = open_on(run, model, table, mvc, &e, err);
-    }
-    if (status == MHE_OK) {
-        int32_t next = 0;
-        for (int32_t k = 0; k < n_frames; k++) {
-            for (; next < table->n_rows && table->time[next] + e->offset <= time[k] + SAME_TIME;
-                 next++) {
-                mhi_electrodes_push(e, table->time[next],
-                                    table->values + (ptrdiff_t)next * table->n_columns);
-            }
-            mhi_electrodes_at(e, time[k], emg + (ptrdiff_t)k * e->n_muscles);
-        }
-        *n_muscles_found = e->n_wires;
-        *report = (mhi_emg_report){e->n_channels, table->rate, e->offset,
-                                   mhi_envelope_delay(e->envelope), e->lag};
-        status = mhi_electrodes_check_peaks(run, table->path, e->peaks, host, err);
-    }
-    mhi_electrodes_close(e);
-    free(mvc);
-    return status;
 }

@@ -42,6 +42,11 @@ void mhi_electrodes_at(const mhi_electrodes *electrodes, double time, double *em
 double mhi_electrodes_filter_delay(const mhi_electrodes *electrodes);
 double mhi_electrodes_lag(const mhi_electrodes *electrodes);
 
+/* Envelope at maximal contraction of each channel [channels]: as given, from emg.mvc_file, or 1.
+ * MHE_E_INPUT: the file. [cold] */
+mhe_status mhi_electrodes_mvc(const mhi_run *run, const mhe_description *model, double *mvc,
+                              mhe_error *err);
+
 /* What became of a recording. */
 typedef struct mhi_emg_report {
     int32_t n_channels;               /* 0: the columns are muscles; the rest is 0 then */

@@ -2,19 +2,9 @@
 /* open.c: an estimator from a config file, for applications that embed it. */
 #include "estimator/estimator_private.h"
 
-static void silent(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text;
-}
-
-static const void *no_service(const mhe_host *host, const char *id) {
-    (void)host, (void)id;
-    return NULL;
-}
-
 mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
                               const mhe_host *host, mhe_estimator **estimator, mhe_error *err) {
-    static const mhe_host quiet = {.size = sizeof quiet, .log = silent, .service = no_service};
-    host = host == NULL ? &quiet : host;
+    host = mhi_host_or_silent(host);
     mhi_registry *registry = NULL;
     mhi_run *run = NULL;
     *estimator = NULL;

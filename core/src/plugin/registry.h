@@ -9,6 +9,9 @@
 
 typedef struct mhi_registry mhi_registry;
 
+/* `host`, or one that drops all messages where it is NULL. [any] */
+const mhe_host *mhi_host_or_silent(const mhe_host *host);
+
 /* An empty registry that already knows its standard folders: MHE_PLUGIN_PATH (':' between folders),
  * the installed <libdir>/mhe/plugins/abi0, for programs of the build tree its plugin folder. They
  * are scanned at the first look-up. `host` is lent for life. [cold] */
