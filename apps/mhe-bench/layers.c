@@ -5,6 +5,7 @@
 #include "plugin/instance.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 struct layers {
     const rig *rig;
@@ -18,17 +19,15 @@ struct layers {
     mhe_acceleration value, derivatives;
     double *rate, *rate_e, *rate_a;
     mhe_stage_values step, linear_step, cost, all;
+    int32_t again;           /* calls of call_again() */
+    double *near_x, *near_u; /* its point */
     mhi_arena arena;
 };
 
-const char *const layer_keys[N_LAYERS] = {"kinematics",
-                                          "acceleration",
-                                          "acceleration_derivatives",
-                                          "activation_rate",
-                                          "interval",
-                                          "interval_derivatives",
-                                          "stage_cost",
-                                          "window_linearisation"};
+const char *const layer_keys[N_LAYERS] = {
+    "kinematics",      "acceleration", "acceleration_derivatives",
+    "activation_rate", "interval",     "interval_derivatives",
+    "interval_again",  "stage_cost",   "window_linearisation"};
 
 const char *const layer_names[N_LAYERS] = {"skeleton kinematics, all outputs",
                                            "system acceleration",
@@ -36,6 +35,7 @@ const char *const layer_names[N_LAYERS] = {"skeleton kinematics, all outputs",
                                            "activation rates, derivatives",
                                            "shooting interval",
                                            "shooting interval with A and B",
+                                           "the same 1e-3 away from the last",
                                            "stage cost, gradient, Hessian",
                                            "linearisation of the window"};
 
@@ -73,6 +73,26 @@ static mhe_status call_stage(layers *l, const mhe_stage_values *out, mhe_error *
     return l->problem->evaluate(l->problem, 0, k, p.x, p.u, out, err);
 }
 
+#define AGAIN_CALLS 32
+#define AGAIN_AWAY 1e-3
+
+static mhe_status call_again(layers *l, mhe_error *err) {
+    const int32_t n_x = l->system->n_x, n_u = l->system->n_u, i = l->again++ % AGAIN_CALLS;
+    if (i == 0) {
+        const point p = next_point(l);
+        memcpy(l->near_x, p.x, sizeof(double) * (size_t)n_x);
+        memcpy(l->near_u, p.u, sizeof(double) * (size_t)n_u);
+    }
+    const double away = i % 2 == 0 ? AGAIN_AWAY : -AGAIN_AWAY;
+    for (int32_t j = 0; j < n_x; j++) {
+        l->near_x[j] += away;
+    }
+    for (int32_t j = 0; j < n_u; j++) {
+        l->near_u[j] += away;
+    }
+    return l->problem->evaluate(l->problem, 0, 0, l->near_x, l->near_u, &l->linear_step, err);
+}
+
 static mhe_status call_linearisation(layers *l, mhe_error *err) {
     mhe_status status = MHE_OK;
     for (int32_t k = 0; k <= l->problem->n_intervals && status == MHE_OK; k++) {
@@ -97,6 +117,8 @@ static mhe_status call(layers *l, int32_t layer, mhe_error *err) {
         return call_stage(l, &l->step, err);
     case LAYER_INTERVAL_DERIVATIVES:
         return call_stage(l, &l->linear_step, err);
+    case LAYER_INTERVAL_AGAIN:
+        return call_again(l, err);
     case LAYER_COST:
         return call_stage(l, &l->cost, err);
     default:
@@ -154,7 +176,9 @@ static mhe_status take_arrays(layers *l, mhe_error *err) {
                   {&all->hess_uu, n_u * n_u},
                   {&all->x_next, n_x},
                   {&all->A, n_x * n_x},
-                  {&all->B, n_x * n_u}};
+                  {&all->B, n_x * n_u},
+                  {&l->near_x, n_x},
+                  {&l->near_u, n_u}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         *wanted[i].array = MHI_TAKE(&l->arena, double, wanted[i].n);
         if (*wanted[i].array == NULL) {

@@ -12,6 +12,7 @@ enum {
     LAYER_ACTIVATION_RATE,
     LAYER_INTERVAL,
     LAYER_INTERVAL_DERIVATIVES,
+    LAYER_INTERVAL_AGAIN,
     LAYER_COST,
     LAYER_LINEARISATION,
     N_LAYERS
@@ -27,7 +28,8 @@ mhe_status layers_create(rig *r, layers **result, mhe_error *err);
 void layers_free(layers *l);
 
 int layers_has(const layers *l, int32_t layer); /* 0: this problem has no such layer */
-/* Seconds of `calls` calls, each at the next point of the motion. */
+/* Seconds of `calls` calls, each at the next point of the motion; LAYER_INTERVAL_AGAIN: 1e-3 away
+ * from the last, as between the iterates of an estimator, with a new point after 32 calls. */
 mhe_status layers_time(layers *l, int32_t layer, int32_t calls, double *seconds, mhe_error *err);
 
 #endif
