@@ -28,8 +28,8 @@ mhe_status layers_create(rig *r, layers **result, mhe_error *err);
 void layers_free(layers *l);
 
 int layers_has(const layers *l, int32_t layer); /* 0: this problem has no such layer */
-/* Seconds of `calls` calls, each at the next point of the motion; LAYER_INTERVAL_AGAIN: 1e-3 away
- * from the last, as between the iterates of an estimator, with a new point after 32 calls. */
+/* Seconds of `calls` calls, each at the next point of the motion; of LAYER_INTERVAL_AGAIN, each
+ * 1e-3 (of every state and control) away from the last, as between the iterates of an estimator. */
 mhe_status layers_time(layers *l, int32_t layer, int32_t calls, double *seconds, mhe_error *err);
 
 #endif

@@ -32,10 +32,10 @@ has table.txt p50 p95 p99 max 'x med' 'skeleton kinematics' 'system acceleration
     'formulation=excitation horizon.window=2' 'formulation=activation horizon.window=3'
 json=result/bench.json
 has $json '"kinematics"' '"acceleration"' '"acceleration_derivatives"' '"activation_rate"' '"interval"' \
-    '"interval_derivatives"' '"stage_cost"' '"window_linearisation"' '"calls_per_sample"' '"ratio_to_first"' \
+    '"interval_derivatives"' '"interval_again"' '"stage_cost"' '"window_linearisation"' '"calls_per_sample"' '"ratio_to_first"' \
     '"rate_hz"' '"frame_ms"' '"first_frame_ms"' '"p50"' '"p95"' '"p99"' '"converged"' '"rmse"' '"force_n"'
-# 8 layers of two formulations, of which one has no activation dynamics; 4 variants.
-[ "$(grep -c '"calls_per_sample"' $json)" -eq 15 ] || fail "$(grep -c '"calls_per_sample"' $json) layers"
+# 9 layers of two formulations, of which one has no activation dynamics; 4 variants.
+[ "$(grep -c '"calls_per_sample"' $json)" -eq 17 ] || fail "$(grep -c '"calls_per_sample"' $json) layers"
 [ "$(grep -c '"frame_ms"' $json)" -eq 4 ] || fail "$(grep -c '"frame_ms"' $json) runs"
 grep -q null $json && fail "a value is missing"
 if command -v python3 > /dev/null; then
