@@ -15,15 +15,28 @@
 
 typedef struct kernels {
     const char *name; /* of the instruction set */
-    /* C [m x n] = keep * C + alpha A^T B with A [k x m], B [k x n]; keep is 0 or 1. `upper`: only
-     * what lies on or above the diagonal is needed. */
+    /* C [m x n] = D + alpha A^T B with A [k x m], B [k x n]; D has the rows of C, may be C itself,
+     * and is zero where NULL. `upper`: only what lies on or above the diagonal is needed. */
     void (*product)(int32_t m, int32_t n, int32_t k, double alpha, const double *A, int32_t ld_a,
-                    const double *B, int32_t ld_b, double keep, double *C, int32_t ld_c,
+                    const double *B, int32_t ld_b, const double *D, double *C, int32_t ld_c,
                     int32_t upper);
+    /* C [m x n] += A diag(d); d has zeros behind n. */
+    void (*add_columns)(int32_t m, int32_t n, const double *A, int32_t ld_a, const double *d,
+                        double *C, int32_t ld_c);
+    /* C [m x n] += diag(d) A from column first + i on in row i. */
+    void (*add_rows)(int32_t m, int32_t n, int32_t first, const double *d, const double *A,
+                     int32_t ld_a, double *C, int32_t ld_c);
     /* First n rows of the upper triangle of the symmetric M [n_all x n_all]: M = U^T U there, so
      * that U is the Cholesky factor in the first n columns and U^-T M in the others. Each U_ii^-1
      * goes to `inverse` [n]. 0: not positive definite. */
     int32_t (*factor)(int32_t n, int32_t n_all, double *M, int32_t ld, double *inverse);
+    /* U^T y = m in the first n entries of m [n_all], which become y; what lies behind them loses
+     * L^T y. [U L] and `inverse` are what factor() made. */
+    void (*substitute)(int32_t n, int32_t n_all, const double *U, int32_t ld, const double *inverse,
+                       double *m);
+    /* U w = -y; y is used up. */
+    void (*substitute_back)(int32_t n, const double *U, int32_t ld, const double *inverse,
+                            double *y, double *w);
     /* y [n] += alpha A^T x, A [m x n]; y has KERNEL_LD(n) doubles. */
     void (*add_transposed)(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
                            const double *x, double *y);

@@ -4,6 +4,7 @@
 #include "kernels.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* Four doubles, wherever they lie; narrower machines take two instructions each. */
 typedef double vec4 __attribute__((vector_size(32), aligned(8), may_alias));
@@ -14,8 +15,8 @@ typedef double vec4 __attribute__((vector_size(32), aligned(8), may_alias));
 /* `rows` rows of C from column j on, 8 columns; `rows` is a constant once inlined. */
 __attribute__((always_inline)) static inline void block(int32_t rows, int32_t k, double alpha,
                                                         const double *A, int32_t ld_a,
-                                                        const double *B, int32_t ld_b, double keep,
-                                                        double *C, int32_t ld_c) {
+                                                        const double *B, int32_t ld_b,
+                                                        const double *D, double *C, int32_t ld_c) {
     vec4 sum[4][2] = {{{0}}};
     for (int32_t p = 0; p < k; p++) {
         const vec4 left = AT(B + p * ld_b), right = AT(B + p * ld_b + 4);
@@ -27,9 +28,9 @@ __attribute__((always_inline)) static inline void block(int32_t rows, int32_t k,
     }
     for (int32_t r = 0; r < rows; r++) {
         double *c = C + r * ld_c;
-        if (keep != 0) {
-            PUT(c) = AT(c) + alpha * sum[r][0];
-            PUT(c + 4) = AT(c + 4) + alpha * sum[r][1];
+        if (D != NULL) {
+            PUT(c) = AT(D + r * ld_c) + alpha * sum[r][0];
+            PUT(c + 4) = AT(D + r * ld_c + 4) + alpha * sum[r][1];
         } else {
             PUT(c) = alpha * sum[r][0];
             PUT(c + 4) = alpha * sum[r][1];
@@ -38,21 +39,22 @@ __attribute__((always_inline)) static inline void block(int32_t rows, int32_t k,
 }
 
 static void product(int32_t m, int32_t n, int32_t k, double alpha, const double *A, int32_t ld_a,
-                    const double *B, int32_t ld_b, double keep, double *C, int32_t ld_c,
+                    const double *B, int32_t ld_b, const double *D, double *C, int32_t ld_c,
                     int32_t upper) {
     for (int32_t i = 0; i < m; i += 4) {
         const int32_t rows = m - i;
         for (int32_t j = upper ? i : 0; j < n; j += 8) {
             const double *a = A + i, *b = B + j;
             double *c = C + i * ld_c + j;
+            const double *before = D != NULL ? D + i * ld_c + j : NULL;
             if (rows >= 4) {
-                block(4, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+                block(4, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             } else if (rows == 3) {
-                block(3, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+                block(3, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             } else if (rows == 2) {
-                block(2, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+                block(2, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             } else {
-                block(1, k, alpha, a, ld_a, b, ld_b, keep, c, ld_c);
+                block(1, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             }
         }
     }
@@ -68,7 +70,8 @@ static inline void subtract_row(int32_t from, int32_t n, double a, const double 
 static int32_t factor(int32_t n, int32_t n_all, double *M, int32_t ld, double *inverse) {
     for (int32_t i = 0; i < n; i += 4) {
         const int32_t end = i + 4 < n ? i + 4 : n;
-        product(end - i, n_all - i, i, -1, M + i, ld, M + i, ld, 1, M + i * ld + i, ld, 0);
+        double *corner = M + i * ld + i;
+        product(end - i, n_all - i, i, -1, M + i, ld, M + i, ld, corner, corner, ld, 0);
         for (int32_t r = i; r < end; r++) {
             double *row = M + r * ld;
             for (int32_t p = i; p < r; p++) {
@@ -84,6 +87,43 @@ static int32_t factor(int32_t n, int32_t n_all, double *M, int32_t ld, double *i
         }
     }
     return 1;
+}
+
+static void add_columns(int32_t m, int32_t n, const double *A, int32_t ld_a, const double *d,
+                        double *C, int32_t ld_c) {
+    for (int32_t i = 0; i < m; i++) {
+        const double *a = A + i * ld_a;
+        double *c = C + i * ld_c;
+        for (int32_t j = 0; j < n; j += 4) {
+            PUT(c + j) = AT(c + j) + AT(a + j) * AT(d + j);
+        }
+    }
+}
+
+static void add_rows(int32_t m, int32_t n, int32_t first, const double *d, const double *A,
+                     int32_t ld_a, double *C, int32_t ld_c) {
+    for (int32_t i = 0; i < m; i++) {
+        subtract_row(first + i, n, -d[i], A + i * ld_a, C + i * ld_c);
+    }
+}
+
+static void substitute(int32_t n, int32_t n_all, const double *U, int32_t ld, const double *inverse,
+                       double *m) {
+    for (int32_t i = 0; i < n; i++) {
+        m[i] *= inverse[i];
+        subtract_row(i + 1, n_all, m[i], U + i * ld, m);
+    }
+}
+
+static void substitute_back(int32_t n, const double *U, int32_t ld, const double *inverse,
+                            double *y, double *w) {
+    for (int32_t i = n - 1; i >= 0; i--) {
+        double sum = y[i];
+        for (int32_t j = i + 1; j < n; j++) {
+            sum += U[i * ld + j] * w[j];
+        }
+        w[i] = -sum * inverse[i];
+    }
 }
 
 static void add_transposed(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
@@ -116,6 +156,10 @@ static void add(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
 
 const kernels KERNELS_TABLE = {.name = KERNELS_NAME,
                                .product = product,
+                               .add_columns = add_columns,
+                               .add_rows = add_rows,
                                .factor = factor,
+                               .substitute = substitute,
+                               .substitute_back = substitute_back,
                                .add_transposed = add_transposed,
                                .add = add};

@@ -311,6 +311,12 @@ static double advance(qp *q, double barrier, double least) {
     return length;
 }
 
+/* A Newton step leaves (1 - length) of a linear residual. More is rounding, which matters where it
+ * is about as large as what is asked for. */
+static int32_t is_rounding(double before, double after, double length, double limit) {
+    return after > 0.1 * limit && after > (1 - length) * before + 0.1 * before;
+}
+
 int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t warm) {
     int32_t result = QP_LIMIT;
     q->stages = stages;
@@ -327,11 +333,11 @@ int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t
             result = QP_FAILED;
             break;
         }
-        const double before = q->stationarity,
+        const double slope = q->stationarity, gap = q->feasibility,
                      length = advance(q, barrier, LEAST_BARRIER * limits->complementarity);
         barrier = measure(q);
-        /* A Newton step leaves (1 - length) of a linear residual; more is rounding. */
-        q->refine |= q->stationarity > (1 - length) * before + 0.1 * before;
+        q->refine |= is_rounding(slope, q->stationarity, length, limits->stationarity) ||
+                     is_rounding(gap, q->feasibility, length, limits->feasibility);
     }
     if (!isfinite(q->stationarity + q->feasibility + barrier)) {
         result = QP_FAILED;

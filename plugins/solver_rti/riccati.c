@@ -46,8 +46,19 @@ static double *inverse_of(const riccati *r, int32_t k) {
 static void multiply_cost(riccati *r, const qp_stage *stage, const double *P, int32_t n) {
     const qp_shape *s = r->shape;
     /* P is symmetric: its first columns are its first rows, transposed. */
-    s->kernels->product(s->n_x, n, s->n_dense, 1, P, s->ld_x, stage->F, s->ld_z, 0, r->T, s->ld_z,
-                        0);
+    s->kernels->product(s->n_x, n, s->n_dense, 1, P, s->ld_x, stage->F, s->ld_z, NULL, r->T,
+                        s->ld_z, 0);
+    if (s->in_order) {
+        const int32_t m = s->n_x - s->n_dense, u = s->control_of[s->n_dense];
+        s->kernels->add_columns(s->n_x, m, P + s->n_dense, s->ld_x, stage->by_control + s->n_dense,
+                                r->T + u, s->ld_z);
+        if (n > s->n_u) {
+            s->kernels->add_columns(s->n_x, m, P + s->n_dense, s->ld_x,
+                                    stage->by_state + s->n_dense, r->T + s->n_u + s->n_dense,
+                                    s->ld_z);
+        }
+        return;
+    }
     for (int32_t i = 0; i < s->n_x; i++) {
         const double *row = P + i * s->ld_x;
         double *t = r->T + i * s->ld_z;
@@ -69,28 +80,45 @@ static void add_row(int32_t from, int32_t n, double a, const double *x, double *
     }
 }
 
+/* M += F^T T, upper triangle, of the rows of F behind the dense ones. */
+static void add_simple_rows(const riccati *r, const qp_stage *stage, int32_t n, double *M) {
+    const qp_shape *s = r->shape;
+    const int32_t m = s->n_x - s->n_dense;
+    const double *T = r->T + s->n_dense * s->ld_z;
+    if (s->in_order) {
+        const int32_t u = s->control_of[s->n_dense], x = s->n_u + s->n_dense;
+        s->kernels->add_rows(m, n, u, stage->by_control + s->n_dense, T, s->ld_z, M + u * s->ld_z,
+                             s->ld_z);
+        if (n > s->n_u) {
+            s->kernels->add_rows(m, n, x, stage->by_state + s->n_dense, T, s->ld_z, M + x * s->ld_z,
+                                 s->ld_z);
+        }
+        return;
+    }
+    for (int32_t i = 0; i < m; i++) {
+        const double *t = T + i * s->ld_z;
+        const int32_t u = s->control_of[s->n_dense + i], x = s->n_u + s->n_dense + i;
+        if (u >= 0) {
+            add_row(u, n, stage->by_control[s->n_dense + i], t, M + u * s->ld_z);
+        }
+        if (x < n) {
+            add_row(x, n, stage->by_state[s->n_dense + i], t, M + x * s->ld_z);
+        }
+    }
+}
+
 /* M = H + diag d + F^T P F, upper triangle of the first n rows and columns. */
 static void build(riccati *r, const qp_stage *stage, const double *diagonal, int32_t k, int32_t n) {
     const qp_shape *s = r->shape;
     double *M = M_of(r, k);
     multiply_cost(r, stage, P_of(r, k + 1), n);
-    memcpy(M, stage->H, sizeof(double) * (size_t)n * (size_t)s->ld_z);
-    s->kernels->product(n, n, s->n_dense, 1, stage->F, s->ld_z, r->T, s->ld_z, 1, M, s->ld_z, 1);
-    for (int32_t i = s->n_dense; i < s->n_x; i++) {
-        const double *t = r->T + i * s->ld_z;
-        const int32_t u = s->control_of[i], x = s->n_u + i;
-        if (u >= 0) {
-            add_row(u, n, stage->by_control[i], t, M + u * s->ld_z);
-        }
-        if (x < n) {
-            add_row(x, n, stage->by_state[i], t, M + x * s->ld_z);
-        }
-    }
+    s->kernels->product(n, n, s->n_dense, 1, stage->F, s->ld_z, r->T, s->ld_z, stage->H, M, s->ld_z,
+                        1);
+    add_simple_rows(r, stage, n, M);
     for (int32_t i = 0; i < n; i++) {
         M[i * s->ld_z + i] += diagonal[(ptrdiff_t)k * s->ld_z + i];
     }
 }
-
 /* Replaces the rows and columns of fixed variables by those of the unit matrix. */
 static void pin(const uint8_t *fixed, int32_t n_rows, int32_t n, double *M, int32_t ld) {
     for (int32_t i = 0; i < n_rows; i++) {
@@ -140,33 +168,12 @@ int32_t riccati_factor(riccati *r, const qp_stage *stages, const double *diagona
         }
         if (n > s->n_u) {
             double *M_xx = M + s->n_u * s->ld_z + s->n_u, *L = M + s->n_u;
-            s->kernels->product(s->n_x, s->n_x, s->n_u, -1, L, s->ld_z, L, s->ld_z, 1, M_xx,
+            s->kernels->product(s->n_x, s->n_x, s->n_u, -1, L, s->ld_z, L, s->ld_z, M_xx, M_xx,
                                 s->ld_z, 1);
             mirror(s, M_xx, s->ld_z, P_of(r, k));
         }
     }
     return r->first_is_fixed || factor_first(r);
-}
-
-/* U^T y = m; what lies behind the first n entries of m loses L^T y. */
-static void substitute(int32_t n, int32_t n_all, const double *U, int32_t ld, const double *inverse,
-                       double *m) {
-    for (int32_t i = 0; i < n; i++) {
-        m[i] *= inverse[i];
-        add_row(i + 1, n_all, -m[i], U + i * ld, m);
-    }
-}
-
-/* U w = -y */
-static void substitute_back(int32_t n, const double *U, int32_t ld, const double *inverse,
-                            const double *y, double *w) {
-    for (int32_t i = n - 1; i >= 0; i--) {
-        double sum = y[i];
-        for (int32_t j = i + 1; j < n; j++) {
-            sum += U[i * ld + j] * w[j];
-        }
-        w[i] = -sum * inverse[i];
-    }
 }
 
 /* p_k, and y_k = U^-T m_u. */
@@ -185,7 +192,7 @@ static void sweep_back(riccati *r, const qp_stage *stages, const double *g, cons
             m[i] = r->fixed[(ptrdiff_t)k * s->ld_z + i] ? 0 : m[i];
         }
         const int32_t n = k == 0 && r->first_is_fixed ? s->n_u : s->n_z;
-        substitute(s->n_u, n, M_of(r, k), s->ld_z, inverse_of(r, k), m);
+        s->kernels->substitute(s->n_u, n, M_of(r, k), s->ld_z, inverse_of(r, k), m);
         memcpy(row_x(s, r->p, k), m + s->n_u, bytes);
     }
 }
@@ -199,8 +206,8 @@ static void solve_first(riccati *r, double *x) {
     for (int32_t i = 0; i < s->n_x; i++) {
         r->v[i] = r->fixed[s->n_u + i] ? 0 : r->p[i];
     }
-    substitute(s->n_x, s->n_x, r->first, s->ld_x, r->first_inverse, r->v);
-    substitute_back(s->n_x, r->first, s->ld_x, r->first_inverse, r->v, x);
+    s->kernels->substitute(s->n_x, s->n_x, r->first, s->ld_x, r->first_inverse, r->v);
+    s->kernels->substitute_back(s->n_x, r->first, s->ld_x, r->first_inverse, r->v, x);
 }
 
 void riccati_solve(riccati *r, const qp_stage *stages, const double *g, const double *b, double *w,
@@ -215,7 +222,7 @@ void riccati_solve(riccati *r, const qp_stage *stages, const double *g, const do
         const double *M = M_of(r, k);
         s->kernels->add(s->n_u, k == 0 && r->first_is_fixed ? 0 : s->n_x, 1, M + s->n_u, s->ld_z,
                         now + s->n_u, y);
-        substitute_back(s->n_u, M, s->ld_z, inverse_of(r, k), y, now);
+        s->kernels->substitute_back(s->n_u, M, s->ld_z, inverse_of(r, k), y, now);
         memcpy(next, b + (ptrdiff_t)k * s->ld_x, bytes);
         qp_forward(s, &stages[k], now, next);
         memset(multiplier, 0, bytes); /* -(P x + p) of the next stage */

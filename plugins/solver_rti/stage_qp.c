@@ -38,6 +38,10 @@ void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape
            is_simple(problem, shape->n_dense - 1, &control_of[shape->n_dense - 1])) {
         shape->n_dense--;
     }
+    shape->in_order = shape->n_dense < n_x && control_of[shape->n_dense] >= 0;
+    for (int32_t i = shape->n_dense + 1; i < n_x; i++) {
+        shape->in_order &= control_of[i] == control_of[i - 1] + 1;
+    }
 }
 
 size_t qp_stages_size(const qp_shape *s) {

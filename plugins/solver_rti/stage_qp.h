@@ -20,6 +20,7 @@ typedef struct qp_shape {
      * none. */
     int32_t n_dense;
     const int32_t *control_of; /* [n_x]; -1: none */
+    int32_t in_order; /* each of them depends on the control behind that of the state before it */
     const kernels *kernels;
 } qp_shape;
 
