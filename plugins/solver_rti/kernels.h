@@ -34,9 +34,9 @@ typedef struct kernels {
      * L^T y. [U L] and `inverse` are what factor() made. */
     void (*substitute)(int32_t n, int32_t n_all, const double *U, int32_t ld, const double *inverse,
                        double *m);
-    /* U w = -y; y is used up. */
+    /* U w = -y */
     void (*substitute_back)(int32_t n, const double *U, int32_t ld, const double *inverse,
-                            double *y, double *w);
+                            const double *y, double *w);
     /* y [n] += alpha A^T x, A [m x n]; y has KERNEL_LD(n) doubles. */
     void (*add_transposed)(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
                            const double *x, double *y);

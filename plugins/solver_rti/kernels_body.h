@@ -116,13 +116,20 @@ static void substitute(int32_t n, int32_t n_all, const double *U, int32_t ld, co
 }
 
 static void substitute_back(int32_t n, const double *U, int32_t ld, const double *inverse,
-                            double *y, double *w) {
+                            const double *y, double *w) {
     for (int32_t i = n - 1; i >= 0; i--) {
-        double sum = y[i];
-        for (int32_t j = i + 1; j < n; j++) {
-            sum += U[i * ld + j] * w[j];
+        const double *row = U + i * ld;
+        double sum[4] = {y[i]}; /* four at a time: a sum has to wait for itself */
+        int32_t j = i + 1;
+        for (; j + 4 <= n; j += 4) {
+            for (int32_t l = 0; l < 4; l++) {
+                sum[l] += row[j + l] * w[j + l];
+            }
         }
-        w[i] = -sum * inverse[i];
+        for (; j < n; j++) {
+            sum[0] += row[j] * w[j];
+        }
+        w[i] = -((sum[0] + sum[1]) + (sum[2] + sum[3])) * inverse[i];
     }
 }
 

@@ -4,6 +4,7 @@
 #include "estimator/estimator_private.h"
 #include "estimator/recording.h"
 #include "fixture.h"
+#include "noise/noise.h"
 #include "support.h"
 #include "use.h"
 
@@ -70,107 +71,169 @@ static double difference(const double *a, const double *b, size_t n) {
     return most;
 }
 
-/* One run over the demo. */
+/* One run over a motion. */
 typedef struct tally {
-    const char *formulation, *cost, *curves;
-    int windows, converged, both, agree;
-    double x, u, objective; /* largest differences */
+    const char *motion, *formulation, *cost, *curves;
+    int noisy, every; /* every so many windows are compared */
+    int windows, by_rti, by_ipopt, both, agree;
+    double x, u, objective; /* largest differences of those that agree */
+    double any_objective;   /* ... and of all windows, converged or not */
 } tally;
 
 static void compare(contender *rti, contender *ipopt, const mhe_estimator *e, tally *t) {
     double *last = e->guess_x + (ptrdiff_t)e->n * e->n_x; /* to start with a gap */
     memcpy(last, last - e->n_x, sizeof(double) * (size_t)e->n_x);
-    const int is_converged = contender_solve(rti, e->guess_x, e->guess_u);
-    t->windows++;
-    t->converged += is_converged;
-    if (!contender_solve(ipopt, e->guess_x, e->guess_u) || !is_converged) {
-        return;
-    }
+    const int by_rti = contender_solve(rti, e->guess_x, e->guess_u);
+    const int by_ipopt = contender_solve(ipopt, e->guess_x, e->guess_u);
     const double x = difference(rti->at.x, ipopt->at.x, rti->n_x);
     const double u = difference(rti->at.u, ipopt->at.u, rti->n_u);
     const double objective =
         fabs(rti->info.objective - ipopt->info.objective) / fabs(ipopt->info.objective);
-    t->both++;
-    t->agree += x < 1e-4 && u < 1e-4 && objective < 1e-6;
-    t->x = fmax(t->x, x);
-    t->u = fmax(t->u, u);
-    t->objective = fmax(t->objective, objective);
+    t->windows++;
+    t->by_rti += by_rti;
+    t->by_ipopt += by_ipopt;
+    t->both += by_rti && by_ipopt;
+    t->any_objective = fmax(t->any_objective, objective);
+    if (by_rti && by_ipopt && x < 1e-4 && u < 1e-4 && objective < 1e-6) {
+        t->agree++;
+        t->x = fmax(t->x, x);
+        t->u = fmax(t->u, u);
+        t->objective = fmax(t->objective, objective);
+    }
 }
 
-/* The windows of the demo, each started as the estimator started it, but for the newest state. */
-static void follow(tally *t) {
-    char yaml[1024];
+/* Markers [n_frames x 3 n_k] of the reference, and noise on its EMG: the paper's larger levels. */
+static void record(const test_fixture *f, mhi_recording *r, int noisy, mhi_record *markers) {
+    const mhe_description *d = mhi_system_description(f->system);
+    const mhi_noise noise = {.seed = 1, .markers.sd = noisy ? 0.005 : 0};
+    mhe_error err = {0};
+    if (mhi_noise_markers(&noise, r, d, f->run->model.plugin, f->run->model.config, &f->host,
+                          markers, &err) != MHE_OK) {
+        fail_msg("%s", err.text);
+    }
+    for (int32_t i = 0; noisy && i < d->n_muscles; i++) {
+        mhi_noise_harmonics(r->emg + i, r->n_frames, d->n_muscles, 1.5, noise.seed, i);
+    }
+}
+
+/* The windows of the motion, each started as the estimator started it, but for the newest state. 0:
+ * its file is not here. */
+static int follow(tally *t) {
+    char path[512], yaml[2048];
+    if (strcmp(t->motion, "demo") == 0) {
+        (void)snprintf(path, sizeof path, "%s/models/arm19/demo_reference.sto",
+                       MHE_TEST_SOURCE_DIR);
+    } else if (test_data_path(path, sizeof path, "arm19/seed_reference_states.sto") == NULL) {
+        return 0;
+    }
     (void)snprintf(yaml, sizeof yaml,
                    "model: {file: $ARM19}\nmuscle: {curves: %s}\nformulation: %s\n"
-                   "data: {markers: %s/demo_markers.trc, emg: %s/demo_emg.sto}\n"
-                   "initial: {q: [-0.1, -0.3, -0.1, 0.1], qdot: [0, 0, 0, 0]}\n"
+                   "data: {emg: %s, reference: %s}\n"
                    "horizon: {window: 7, ratio: 3}\ncosts: [%s]\n"
                    "solver: {plugin: mhe.solver.rti}\n",
-                   t->curves, t->formulation, MHE_TEST_SOURCE_DIR "/models/arm19",
-                   MHE_TEST_SOURCE_DIR "/models/arm19", t->cost);
+                   t->curves, t->formulation, path, path, t->cost);
     test_fixture f;
     if (test_fixture_open(&f, yaml) != MHE_OK) {
         fail_msg("%s", f.err.text);
     }
     mhi_recording *r = NULL;
+    mhi_record markers = {0};
     assert_int_equal(
         mhi_recording_read(f.run, mhi_system_description(f.system), &f.host, &r, &f.err), MHE_OK);
+    record(&f, r, t->noisy, &markers);
+    mhi_estimator_set_start(f.estimator, r->reference.q, r->reference.qdot);
     contender rti, ipopt;
     const mhe_stage_problem *problem = mhi_ocp_face(f.ocp);
     contender_open(&rti, problem, "mhe.solver.rti", "{tolerance: 1e-10, max_iterations: 200}");
     contender_open(&ipopt, problem, "mhe.solver.ipopt",
                    "{tolerance: 1e-12, max_iterations: 200, acceptable_tolerance: 1e-9, "
                    "acceptable_iterations: 8}");
-    const mhe_description *d = mhi_system_description(f.system);
     for (int32_t k = 0; k < r->n_frames; k++) {
         const mhe_frame frame = {.size = sizeof frame,
                                  .time = r->time[k],
-                                 .markers = r->markers + k * 3 * d->n_markers,
-                                 .emg = r->emg + k * d->n_muscles};
+                                 .markers = markers.values + k * markers.n_channels,
+                                 .emg = r->emg + k * mhi_system_description(f.system)->n_muscles};
         mhe_estimate estimate;
         int32_t ready = 0;
         assert_int_equal(mhe_estimator_push(f.estimator, &frame, &estimate, &ready, &f.err),
                          MHE_OK);
         /* The problem still is that of the solve just done. The first one had a proximal term. */
-        if (ready && f.estimator->solved > 1) {
+        if (ready && f.estimator->solved > 1 && f.estimator->solved % t->every == 0) {
             compare(&rti, &ipopt, f.estimator, t);
         }
     }
     contender_close(&rti);
     contender_close(&ipopt);
+    mhi_record_free(&markers);
     mhi_recording_free(r);
     test_fixture_close(&f);
-    print_message("%s, %s: %d windows, %d converged, %d by both, %d agree; largest difference x "
-                  "%.1e, u %.1e, objective %.1e\n",
-                  t->formulation, t->cost, t->windows, t->converged, t->both, t->agree, t->x, t->u,
-                  t->objective);
+    print_message("%s%s, %s, %s, %s: %d windows, %d converged, %d of ipopt, %d of both, %d agree; "
+                  "largest difference x %.1e, u %.1e, objective %.1e, of any window %.1e\n",
+                  t->motion, t->noisy ? " with noise" : "", t->formulation, t->cost, t->curves,
+                  t->windows, t->by_rti, t->by_ipopt, t->both, t->agree, t->x, t->u, t->objective,
+                  t->any_objective);
+    return 1;
 }
 
-/* Ipopt's complementarity at 1e-8 alone moves these objectives by 1e-5: 1e-12 for the reference.
- * Effort alone puts many optima on a kink of the paper's curves, where the one-sided derivatives
- * allow more than one end: those windows are compared with smooth curves. */
-static void same_optimum_as_ipopt(void **state) {
-    (void)state;
-    tally runs[] = {
-        {.formulation = "excitation", .cost = "mhe.cost.emg-markers-high", .curves = "paper2021"},
-        {.formulation = "excitation", .cost = "mhe.cost.min-excitation", .curves = "degroote2016"},
-        {.formulation = "activation", .cost = "mhe.cost.emg-markers-high", .curves = "paper2021"},
-        {.formulation = "activation", .cost = "mhe.cost.min-excitation", .curves = "degroote2016"},
-    };
+static void need_ipopt(void) {
     if (test_plugin("mhe.solver.ipopt", MHE_SOLVER_IFACE) == NULL) {
         skip();
     }
+}
+
+#define TRACK "mhe.cost.emg-markers-high"
+#define EFFORT "mhe.cost.min-excitation"
+
+/* Ipopt's complementarity at 1e-8 alone moves these objectives by 1e-5: 1e-12 for the reference.
+ * Effort alone, and noise, put optima on a kink of the paper's curves, see below: those windows are
+ * compared with smooth curves. */
+static void same_optimum_as_ipopt(void **state) {
+    (void)state;
+    tally runs[] = {
+        {"demo", "excitation", TRACK, "paper2021", .every = 1},
+        {"demo", "activation", TRACK, "paper2021", .every = 1},
+        {"demo", "excitation", EFFORT, "degroote2016", .every = 1},
+        {"demo", "activation", EFFORT, "degroote2016", .every = 1},
+        {"demo", "excitation", TRACK, "degroote2016", .noisy = 1, .every = 1},
+        {"demo", "activation", TRACK, "degroote2016", .noisy = 1, .every = 1},
+        {"seed", "excitation", TRACK, "degroote2016", .noisy = 1, .every = 3},
+    };
+    need_ipopt();
+    int agree = 0;
     for (size_t i = 0; i < sizeof runs / sizeof runs[0]; i++) {
         tally *t = &runs[i];
-        follow(t);
+        if (!follow(t)) {
+            continue; /* the other runs are 500 windows too */
+        }
         assert_true(t->windows > 80);
-        assert_true(t->converged >= 0.98 * t->windows);
+        assert_true(t->by_rti >= 0.98 * t->windows);
         assert_true(t->both >= 0.8 * t->windows);
         assert_int_equal(t->agree, t->both);
+        agree += t->agree;
     }
+    print_message("%d windows agree\n", agree);
+    assert_true(agree >= 500);
+}
+
+/* With noise about one window in ten of the paper's curves ends where an activation sits on a kink:
+ * there the one-sided derivatives vanish nowhere, and neither solver meets a tolerance. Some others
+ * have two stationary points close by. What must hold: this solver converges wherever Ipopt does,
+ * and both come to the same objective, if not to the same digit. */
+static void kinks_stop_both(void **state) {
+    (void)state;
+    tally t = {"demo", "excitation", TRACK, "paper2021", .noisy = 1, .every = 2};
+    need_ipopt();
+    assert_true(follow(&t));
+    assert_true(t.windows > 40);
+    assert_true(t.by_rti >= t.by_ipopt);
+    assert_int_equal(t.both, t.by_ipopt);
+    assert_true(t.by_rti >= 0.8 * t.windows);
+    assert_true(t.agree >= 0.95 * t.both);
+    assert_true(t.any_objective < 1e-5);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(same_optimum_as_ipopt)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(same_optimum_as_ipopt),
+                                       cmocka_unit_test(kinks_stop_both)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

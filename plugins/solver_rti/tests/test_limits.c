@@ -5,6 +5,7 @@
 #include "rig.h"
 #include "support.h"
 
+#include <malloc.h>
 #include <math.h>
 #include <string.h>
 
@@ -245,6 +246,27 @@ static void test_presets(void **state) {
 }
 
 #ifdef MHE_COUNT_ALLOCATIONS
+/* Bytes that a solver of the arm's size takes when it is created. */
+static double megabytes(int n_intervals) {
+    toy t;
+    rig r;
+    toy_arm(&t, n_intervals, 0.03);
+    const struct mallinfo2 before = mallinfo2();
+    assert_int_equal(rig_open(&r, &t, "{}"), MHE_OK);
+    const struct mallinfo2 after = mallinfo2();
+    close_both(&r, &t);
+    return 1e-6 *
+           ((double)(after.uordblks + after.hblkhd) - (double)(before.uordblks + before.hblkhd));
+}
+
+static void test_memory(void **state) {
+    (void)state;
+    const double half = megabytes(50), whole = megabytes(100);
+    print_message("50 intervals %.1f MB, 100 intervals %.1f MB\n", half, whole);
+    assert_true(whole > 1 && whole < 25); /* half of what a whole run may have */
+    assert_true(whole < 2.05 * half);
+}
+
 static void test_no_memory_taken(void **state) {
     (void)state;
     static const char *const yaml[] = {"{}", "{preset: balanced}", "{preset: speed}"};
@@ -283,6 +305,7 @@ int main(void) {
         cmocka_unit_test(test_stops),
         cmocka_unit_test(test_presets),
 #ifdef MHE_COUNT_ALLOCATIONS
+        cmocka_unit_test(test_memory),
         cmocka_unit_test(test_no_memory_taken),
 #endif
     };
