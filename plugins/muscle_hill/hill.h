@@ -19,6 +19,7 @@ struct hill_config {
     double activation_smoothing;
     double damping; /* below 0: the file's, else 0 */
     double vmax;    /* optimal lengths per second; 0: the file's, else 10 */
+    double passive; /* factor of the passive force */
 };
 
 /* a fl fv + fp and its derivatives by a, n and s. */

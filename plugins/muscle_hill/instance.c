@@ -111,6 +111,7 @@ mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t 
         m->l_slack = from->tendon_slack_length;
         m->inverse = 1 / from->optimal_fiber_length;
         set->prepare(from, config, m);
+        m->passive_scale *= config->passive;
         hill->rate_act[i] =
             1 / (config->tau_act > 0 ? config->tau_act : hill_or(from->activation_time, 0.010));
         hill->rate_deact[i] = 1 / (config->tau_deact > 0 ? config->tau_deact

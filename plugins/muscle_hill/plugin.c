@@ -17,6 +17,9 @@ static const mhe_option hill_options[] = {
     MHE_OPT_REAL(struct hill_config, vmax, 0, 0, 1e3, "1/s",
                  "Maximal contraction velocity in optimal lengths per second, degroote2016 and "
                  "thelen2003 only; 0: the file's, else 10."),
+    MHE_OPT_REAL(struct hill_config, passive, 1, 0, 10, "1",
+                 "Factor of the passive fibre force; below 1 where straight paths or scaling "
+                 "stretch muscles beyond what is real, 0: none."),
 };
 
 static const mhe_plugin hill_plugin = {

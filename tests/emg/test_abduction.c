@@ -54,7 +54,7 @@ static void emg_follows_the_arm(void **state) {
     (void)snprintf(link, sizeof link, "%s/abduction", folder);
     (void)snprintf(config, sizeof config, "%s/abduction.yaml", folder);
     assert_int_equal(symlink(data, link), 0);
-    (void)snprintf(command, sizeof command, "cp %s/tests/emg/abduction.yaml %s",
+    (void)snprintf(command, sizeof command, "cp %s/models/abduction/abduction.yaml %s",
                    MHE_TEST_SOURCE_DIR, config);
     assert_int_equal(system(command), 0);
     mhi_registry *registry = NULL;

@@ -21,6 +21,10 @@ static const char *const problems[] = {
     "BRD]}]\n",
     "model: {file: $ARM35}\nmuscle: {curves: degroote2016}\nformulation: activation\n"
     "costs: [{plugin: mhe.cost.min-excitation}]\n",
+    /* Huber's loss: some of the markers lie beyond its limit, some within */
+    "model: {file: $ARM19}\nmuscle: {curves: biorbd, passive: 0.5}\nformulation: activation\n"
+    "costs: [{plugin: mhe.cost.track, signal: markers, sigma: 0.1, huber: 3},\n"
+    "  {plugin: mhe.cost.track, sigma: 0.1, huber: 1}]\n",
 };
 
 typedef struct point {

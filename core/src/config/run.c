@@ -242,6 +242,7 @@ static mhe_status read_use(const struct reader *r, const mhi_section *section, c
     }
     use->weight = own->weight;
     use->sigma = own->sigma;
+    use->huber = own->huber;
     return status;
 }
 

@@ -14,9 +14,9 @@
 /* A plugin as the config uses it. `config` is filled and checked. */
 typedef struct mhi_use {
     const mhe_plugin *plugin;
-    const void *config;   /* plugin->config_size bytes */
-    const mhi_node *node; /* for messages */
-    double weight, sigma; /* costs only: common options */
+    const void *config;          /* plugin->config_size bytes */
+    const mhi_node *node;        /* for messages */
+    double weight, sigma, huber; /* costs only: common options */
 } mhi_use;
 
 #define MHI_UNSUPPORTED_STOP 0
@@ -82,9 +82,11 @@ typedef struct mhi_horizon_section {
 } mhi_horizon_section;
 
 typedef struct mhi_bounds_section {
-    int32_t residual_torques;   /* 0: none; 1: one per coordinate */
-    double residual_torque_max; /* N m */
-    double velocity_max;        /* rad/s */
+    int32_t residual_torques;            /* 0: none; 1: one per coordinate */
+    double residual_torque_max;          /* N m */
+    mhe_text_list residual_torque_at;    /* coordinates that have one; n = 0: all */
+    mhe_text_map residual_torque_limits; /* coordinate: largest magnitude, N m */
+    double velocity_max;                 /* rad/s */
     double activation_min, activation_max, excitation_min, excitation_max;
 } mhi_bounds_section;
 

@@ -107,6 +107,11 @@ static const mhe_option bounds_options[] = {
     MHE_OPT_BOOL(mhi_bounds_section, residual_torques, 0, "Add a free torque at every coordinate."),
     MHE_OPT_REAL(mhi_bounds_section, residual_torque_max, 100, 0, INFINITY, "N m",
                  "Largest magnitude of a residual torque."),
+    MHE_OPT_TEXTS(mhi_bounds_section, residual_torque_at, 0,
+                  "Coordinates that have a residual torque; none: all."),
+    MHE_OPT_MAP(mhi_bounds_section, residual_torque_limits, 0,
+                "Largest magnitude at single coordinates, {NAME: N m}, in the place of "
+                "residual_torque_max."),
     MHE_OPT_REAL(mhi_bounds_section, velocity_max, 10 * PI, 1e-6, INFINITY, "rad/s",
                  "Largest magnitude of a coordinate's velocity."),
     MHE_OPT_REAL(mhi_bounds_section, activation_min, 0, 0, 1, "1", "Least activation."),
@@ -124,6 +129,9 @@ static const mhe_option cost_options[] = {
     MHE_OPT_REAL(mhi_use_section, weight, 1, 0, DBL_MAX, "1", "Factor of the whole cost."),
     MHE_OPT_REAL(mhi_use_section, sigma, 1, 1e-12, DBL_MAX, "unit of the residual",
                  "Residual that counts as one; the cost is divided by its square."),
+    MHE_OPT_REAL(mhi_use_section, huber, 0, 0, DBL_MAX, "sigma",
+                 "Residual (of a marker: its distance) from which on the cost grows linearly "
+                 "instead of squared, so that outliers pull less; 0: never."),
 };
 
 static const mhe_option solver_options[] = {

@@ -16,7 +16,7 @@ typedef struct mhi_use_section {
     const char *plugin;
     const char *file;     /* model */
     int32_t unsupported;  /* model */
-    double weight, sigma; /* costs */
+    double weight, sigma, huber; /* costs */
 } mhi_use_section;
 
 /* The list `channels` of the emg section, and what its keys must agree on (run_emg.c). [cold] */

@@ -13,7 +13,8 @@ static void write_use(const mhi_run *run, const mhi_section *section, const mhi_
                                  .file = run->model_file.file,
                                  .unsupported = run->model_file.unsupported,
                                  .weight = use->weight,
-                                 .sigma = use->sigma};
+                                 .sigma = use->sigma,
+                                 .huber = use->huber};
     mhi_options_write(section->options, section->n_options, &own, indent, out);
     mhi_options_write(use->plugin->options, (int32_t)use->plugin->option_count, use->config, indent,
                       out);

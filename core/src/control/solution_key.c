@@ -68,8 +68,8 @@ static mhe_status add_step(const mhi_step *step, mhi_text *key, mhe_error *err) 
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < step->n_costs && status == MHE_OK; i++) {
         const mhi_use *cost = &step->costs[i];
-        mhi_text_add(key, "cost: # %s, weight %a, sigma %a\n", cost->plugin->id, cost->weight,
-                     cost->sigma);
+        mhi_text_add(key, "cost: # %s, weight %a, sigma %a, huber %a\n", cost->plugin->id,
+                     cost->weight, cost->sigma, cost->huber);
         mhi_options_write(cost->plugin->options, (int32_t)cost->plugin->option_count, cost->config,
                           2, key);
         status = add_plugin(key, cost->plugin, err);

@@ -31,7 +31,8 @@ static mhe_status create_problem(mhi_step_work *w, mhe_error *err) {
     }
     for (int32_t i = 0; i < w->step->n_costs; i++) {
         const mhi_use *cost = &w->step->costs[i];
-        terms[i] = (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma};
+        terms[i] =
+            (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma, cost->huber};
     }
     const mhi_ocp_setup setup = {.host = s->host,
                                  .system = s->system,

@@ -66,16 +66,31 @@ static void drop_outliers(mhe_estimator *e, const double *distance, double neare
     }
 }
 
-/* Velocities by differences, muscles by the EMG. */
+/* Velocities of node k to start from: the least-squares slopes of the postures of up to three nodes
+ * to each side, since the markers' noise over a single interval makes a large velocity. */
+static void guess_velocities(mhe_estimator *e, int32_t k, double *v) {
+    const int32_t from = k < 3 ? 0 : k - 3, to = k + 3 > e->n ? e->n : k + 3;
+    double mean = 0, squares = 0;
+    for (int32_t j = from; j <= to; j++) {
+        mean += e->times[j] / (to - from + 1);
+    }
+    for (int32_t j = from; j <= to; j++) {
+        squares += (e->times[j] - mean) * (e->times[j] - mean);
+    }
+    for (int32_t i = 0; i < e->n_q; i++) {
+        double sum = 0;
+        for (int32_t j = from; j <= to; j++) {
+            sum += (e->times[j] - mean) * mhi_row(e->guess_x, j, e->n_x)[i];
+        }
+        v[i] = sum / squares;
+    }
+}
+
+/* Velocities by slopes, muscles by the EMG. */
 static void guess_rest(mhe_estimator *e) {
     for (int32_t k = 0; k <= e->n; k++) {
         double *x = mhi_row(e->guess_x, k, e->n_x);
-        const int32_t from = k == 0 ? 0 : k - 1, to = k == e->n ? k : k + 1;
-        const double *before = mhi_row(e->guess_x, from, e->n_x);
-        const double *after = mhi_row(e->guess_x, to, e->n_x);
-        for (int32_t i = 0; i < e->n_q; i++) {
-            x[e->n_q + i] = (after[i] - before[i]) / (e->times[to] - e->times[from]);
-        }
+        guess_velocities(e, k, x + e->n_q);
         if (e->n_x > 2 * e->n_q) {
             guess_controls(e, k, x + 2 * e->n_q);
         }

@@ -74,7 +74,8 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     }
     for (int32_t i = 0; i < run->n_costs; i++) {
         const mhi_use *cost = &run->costs[i];
-        terms[i] = (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma};
+        terms[i] =
+            (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma, cost->huber};
     }
     const mhi_ocp_setup ocp = {.host = e->host,
                                .system = e->system,
@@ -129,6 +130,7 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
                   {&e->prior_weight, e->n_x},
                   {&e->start_q, e->n_q},
                   {&e->start_v, e->n_q},
+                  {&e->torque_max, e->n_q},
                   {&e->no_markers, 3 * e->n_k},
                   {&e->no_emg, e->n_m},
                   {&e->out_q, e->n_q},
@@ -214,6 +216,9 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
     }
     if (status == MHE_OK) {
         status = start_from_config(e, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_estimator_limits(e, err);
     }
     if (status != MHE_OK) {
         mhe_estimator_close(e);

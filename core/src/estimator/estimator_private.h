@@ -72,6 +72,7 @@ struct mhe_estimator {
     double *guess_x, *guess_u;           /* what the last solve started from */
     double *prior_centre, *prior_weight; /* [n_x], of an unsettled window's proximal term */
     double *start_q, *start_v;           /* known first state [n_q], NaN where free */
+    double *torque_max;                  /* largest residual torques [n_q], N m; 0: none */
 
     double *no_markers, *no_emg; /* all missing */
 
@@ -85,6 +86,9 @@ double mhi_now(void); /* s of CLOCK_MONOTONIC */
 
 /* estimator.c: nothing is known of the first state. */
 void mhi_estimator_forget_start(mhe_estimator *e);
+
+/* limits.c: torque_max from the bounds section. MHE_E_CONFIG: no such coordinate, no number. */
+mhe_status mhi_estimator_limits(mhe_estimator *e, mhe_error *err);
 
 /* clock.c. Is this frame to be used? Missing nodes before it are put in. MHE_E_ARGUMENT: its time
  * does not follow the last one's. */

@@ -56,8 +56,8 @@ static void set_general_bounds(mhe_estimator *e) {
             upper[2 * e->n_q + i] = b->activation_max;
         }
         for (int32_t i = 0; i < e->n_u && k < e->n; i++) {
-            mhi_ocp_u_lower(e->ocp, k)[i] = i < e->n_m ? low : -b->residual_torque_max;
-            mhi_ocp_u_upper(e->ocp, k)[i] = i < e->n_m ? high : b->residual_torque_max;
+            mhi_ocp_u_lower(e->ocp, k)[i] = i < e->n_m ? low : -e->torque_max[i - e->n_m];
+            mhi_ocp_u_upper(e->ocp, k)[i] = i < e->n_m ? high : e->torque_max[i - e->n_m];
         }
     }
 }

@@ -34,7 +34,8 @@ mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
     *t = (mhi_term){.ops = setup->plugin->ops,
                     .id = setup->plugin->id,
                     .self = setup->config,
-                    .factor = setup->weight / (setup->sigma * setup->sigma)};
+                    .factor = setup->weight / (setup->sigma * setup->sigma),
+                    .limit = setup->huber > 0 ? setup->huber * setup->sigma : INFINITY};
     mhe_status status =
         mhi_cost_create(setup->plugin, host, problem, setup->config, &t->created, &t->layout, err);
     if (t->ops->create != NULL) {
@@ -83,11 +84,12 @@ mhe_status mhi_term_workspace_create(const mhi_term *t, int32_t n_z, mhi_arena *
     w->y_ref = MHI_TAKE(arena, double, t->ny);
     w->r = MHI_TAKE(arena, double, n_res);
     w->r_shift = MHI_TAKE(arena, double, n_res);
+    w->share = MHI_TAKE(arena, double, n_res);
     w->jacobian = MHI_TAKE(arena, double, diagonal ? t->ny : n_res * t->ny);
     w->row = MHI_TAKE(arena, double, n_z);
     w->scratch = mhi_arena_take(arena, t->layout.scratch_bytes);
     if (w->y == NULL || w->y_ref == NULL || w->r == NULL || w->r_shift == NULL ||
-        w->jacobian == NULL || w->row == NULL || w->scratch == NULL) {
+        w->share == NULL || w->jacobian == NULL || w->row == NULL || w->scratch == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;
@@ -242,6 +244,42 @@ static mhe_status check_residuals(const mhi_term *t, const mhi_term_workspace *w
                : MHE_OK;
 }
 
+static double squares_of(const double *r, int32_t n) {
+    double squares = 0;
+    for (int32_t i = 0; i < n; i++) {
+        squares += isnan(r[i]) ? 0 : r[i] * r[i];
+    }
+    return squares;
+}
+
+/* The loss of all rows with a finite limit. Rows beyond it get their share and are scaled by it, so
+ * that their squares have the loss's gradient once the Jacobian is scaled too. */
+static double robust_loss(const mhi_term *t, mhi_term_workspace *w) {
+    const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
+    double loss = 0;
+    for (int32_t i = 0, n = 1; i < t->layout.n_res; i += n) {
+        n = diagonal && t->y_signal[i] == MHI_SIGNAL_MARKERS ? 3 : 1;
+        const double size = sqrt(squares_of(w->r + i, n));
+        const int beyond = size > t->limit;
+        const double share = beyond ? sqrt(t->limit / size) : 1;
+        loss += beyond ? t->limit * (size - 0.5 * t->limit) : 0.5 * size * size;
+        for (int32_t j = i; j < i + n; j++) {
+            w->share[j] = share;
+            w->r[j] *= share;
+        }
+    }
+    return loss;
+}
+
+static void scale_jacobian(const mhi_term *t, mhi_term_workspace *w) {
+    const int32_t width = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL ? 1 : t->ny;
+    for (int32_t i = 0; i < t->layout.n_res; i++) {
+        for (int32_t j = 0; j < width; j++) {
+            w->jacobian[i * width + j] *= w->share[i];
+        }
+    }
+}
+
 mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
                         const mhe_stage *node, const double *y, const double *target,
                         const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum,
@@ -262,12 +300,9 @@ mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_sign
     if (status != MHE_OK) {
         return status;
     }
-    double squares = 0;
-    for (int32_t i = 0; i < t->layout.n_res; i++) {
-        squares += isnan(w->r[i]) ? 0 : w->r[i] * w->r[i];
-    }
+    const int robust = isfinite(t->limit);
     scale *= t->factor;
-    sum->cost += 0.5 * scale * squares;
+    sum->cost += scale * (robust ? robust_loss(t, w) : 0.5 * squares_of(w->r, t->layout.n_res));
     if (sum->gradient == NULL) {
         return MHE_OK;
     }
@@ -281,6 +316,9 @@ mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_sign
     }
     if (status != MHE_OK) {
         return status;
+    }
+    if (robust) {
+        scale_jacobian(t, w);
     }
     (diagonal ? add_diagonal : add_dense)(t, w, signals, jacobian, scale, n_z, sum);
     return MHE_OK;

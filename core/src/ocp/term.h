@@ -15,6 +15,7 @@ typedef struct mhi_term_setup {
     const void *config;
     double weight; /* [1] */
     double sigma;  /* unit of r: r counts as r / sigma */
+    double huber;  /* [sigma] from here on linear; 0: never */
 } mhi_term_setup;
 
 typedef struct mhi_term {
@@ -23,6 +24,7 @@ typedef struct mhi_term {
     const void *self;
     void *created; /* what destroy() takes; NULL where the plugin has no create */
     double factor; /* weight / sigma^2 */
+    double limit;  /* unit of r: beyond it the loss is linear; infinite: nowhere */
     mhe_cost_layout layout;
     int32_t n_signals;
     int32_t signals[MHE_COST_MAX_SIGNALS];
@@ -36,6 +38,7 @@ typedef struct mhi_term {
 typedef struct mhi_term_workspace {
     double *y, *y_ref;   /* [ny] */
     double *r, *r_shift; /* [n_res] */
+    double *share;       /* [n_res] sqrt of a row's weight in the robust loss */
     double *jacobian;    /* [ny] or [n_res x ny] */
     double *row;         /* [n_z] */
     void *scratch;
@@ -65,7 +68,11 @@ uint32_t mhi_term_reads(const mhi_term *term);
 void mhi_term_pattern(const mhi_term *term, const mhi_signals *signals, int32_t n_z,
                       uint8_t *columns, uint8_t *pattern);
 
-/* Adds scale * factor * 1/2 |r|^2 and derivatives at one node. `y`, `target` [signals->n_y],
+/* Adds scale * factor * loss and derivatives at one node. The loss is 1/2 |r|^2, beyond `limit`
+ * Huber's: limit (|r| - limit/2) (Huber 1964, doi:10.1214/aoms/1177703732), where |r| is a marker's
+ * distance (three rows) or one row. Its gradient is exact; its Gauss-Newton Hessian is that of the
+ * squares with weight limit / |r|, without the part along r that would make it smaller:
+ * iteratively reweighted least squares, positive semidefinite. `y`, `target` [signals->n_y],
  * `jacobian` as from mhi_signals_evaluate. Rows that are NaN because data or signals are missing
  * drop out. [hot] */
 mhe_status mhi_term_add(const mhi_term *term, mhi_term_workspace *workspace,
