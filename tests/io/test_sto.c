@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define HEADER "name\nversion=1\nnRows=2\nnColumns=3\ninDegrees=no\nendheader\n"
 
@@ -236,6 +237,38 @@ static void reference_files(void **state) {
     mhi_table_free(t);
 }
 
+/* Its text is given back in parcels of 8 MB while it is read. */
+static void large_file_is_as_from_memory(void **state) {
+    (void)state;
+    const int32_t rows = 400000;
+    char path[] = "/tmp/mhe-sto-XXXXXX", line[96];
+    const size_t room = (size_t)rows * 80;
+    char *text = malloc(room);
+    const int file = mkstemp(path);
+    assert_true(text != NULL && file >= 0);
+    size_t n = (size_t)snprintf(text, room, "endheader\ntime\ta\tb\n");
+    for (int32_t k = 0; k < rows; k++) {
+        const int length = snprintf(line, sizeof line, "%.4f\t%.17g\t%.17g\n", k / 2000.0,
+                                    sin(0.1 * k), cos(0.3 * k));
+        memcpy(text + n, line, (size_t)length);
+        n += (size_t)length;
+    }
+    assert_true(n > 2 * (8u << 20));
+    FILE *out = fdopen(file, "w");
+    assert_true(out != NULL && fwrite(text, 1, n, out) == n && fclose(out) == 0);
+    mhi_table *lent = NULL, *read = NULL;
+    mhe_error err = {0};
+    assert_int_equal(mhi_sto_parse(path, text, n, &lent, &err), MHE_OK);
+    assert_int_equal(mhi_sto_read(path, &read, &err), MHE_OK);
+    assert_int_equal(read->n_rows, rows);
+    assert_memory_equal(read->time, lent->time, sizeof(double) * (size_t)rows);
+    assert_memory_equal(read->values, lent->values, sizeof(double) * 2 * (size_t)rows);
+    mhi_table_free(lent);
+    mhi_table_free(read);
+    (void)unlink(path);
+    free(text);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(accepted_variations),
                                        cmocka_unit_test(repaired_with_a_warning),
@@ -245,6 +278,7 @@ int main(void) {
                                        cmocka_unit_test(hostile_files),
                                        cmocka_unit_test(unreadable_files),
                                        cmocka_unit_test(locale_does_not_matter),
+                                       cmocka_unit_test(large_file_is_as_from_memory),
                                        cmocka_unit_test(reference_files)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

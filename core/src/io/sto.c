@@ -158,23 +158,20 @@ static mhe_status read_rows(mhi_table_reader *reader, const sto_header *header) 
     return MHE_OK;
 }
 
+static mhe_status read_sto(mhi_table_reader *reader) {
+    sto_header header = {0, -1, -1};
+    mhe_status status = read_header(reader, &header);
+    if (status == MHE_OK) {
+        status = read_labels(reader, &header);
+    }
+    return status == MHE_OK ? read_rows(reader, &header) : status;
+}
+
 mhe_status mhi_sto_parse(const char *name, const char *text, size_t length, mhi_table **table,
                          mhe_error *err) {
-    mhi_table_reader reader;
-    sto_header header = {0, -1, -1};
-    mhe_status status = mhi_table_begin(&reader, name, text, length, err);
-    if (status == MHE_OK) {
-        status = read_header(&reader, &header);
-    }
-    if (status == MHE_OK) {
-        status = read_labels(&reader, &header);
-    }
-    if (status == MHE_OK) {
-        status = read_rows(&reader, &header);
-    }
-    return mhi_table_finish(&reader, status, table);
+    return mhi_table_parse(name, text, length, read_sto, table, err);
 }
 
 mhe_status mhi_sto_read(const char *path, mhi_table **table, mhe_error *err) {
-    return mhi_table_read(path, mhi_sto_parse, table, err);
+    return mhi_table_read(path, read_sto, table, err);
 }

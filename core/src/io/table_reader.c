@@ -2,8 +2,6 @@
 /* From text to lines and cells, with messages that say where. */
 #include "io/table_reader.h"
 
-#include "io/slurp.h"
-
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -175,17 +173,12 @@ mhe_status mhi_table_begin(mhi_table_reader *reader, const char *name, const cha
     return MHE_OK;
 }
 
-mhe_status mhi_table_read(const char *path,
-                          mhe_status (*parse)(const char *, const char *, size_t, mhi_table **,
-                                              mhe_error *),
-                          mhi_table **table, mhe_error *err) {
-    char *text = NULL;
-    size_t length = 0;
-    *table = NULL;
-    mhe_status status = mhi_slurp(path, &text, &length, err);
+mhe_status mhi_table_parse(const char *name, const char *text, size_t length, mhi_table_body body,
+                           mhi_table **table, mhe_error *err) {
+    mhi_table_reader reader;
+    mhe_status status = mhi_table_begin(&reader, name, text, length, err);
     if (status == MHE_OK) {
-        status = parse(path, text, length, table, err);
+        status = body(&reader);
     }
-    free(text);
-    return status;
+    return mhi_table_finish(&reader, status, table);
 }

@@ -15,6 +15,7 @@ typedef struct mhi_table_reader {
     int32_t n_cells, cells_capacity;
     int32_t rows_capacity;
     int32_t n_missing; /* empty cells */
+    char *spent;       /* text before `at` that may be given back from here on; NULL: it is lent */
     mhi_c_locale locale;
     mhe_error *err;
 } mhi_table_reader;
@@ -24,11 +25,13 @@ typedef struct mhi_table_reader {
 mhe_status mhi_table_begin(mhi_table_reader *reader, const char *name, const char *text,
                            size_t length, mhe_error *err);
 mhe_status mhi_table_finish(mhi_table_reader *reader, mhe_status status, mhi_table **table);
-/* Reads `path` and hands its text to `parse`. */
-mhe_status mhi_table_read(const char *path,
-                          mhe_status (*parse)(const char *, const char *, size_t, mhi_table **,
-                                              mhe_error *),
-                          mhi_table **table, mhe_error *err);
+/* What a format does between begin and finish. */
+typedef mhe_status (*mhi_table_body)(mhi_table_reader *reader);
+/* begin, `body` and finish on a text; and on a file, whose text is given back to the system while
+ * the table grows: ten minutes of EMG are 200 MB of it. */
+mhe_status mhi_table_parse(const char *name, const char *text, size_t length, mhi_table_body body,
+                           mhi_table **table, mhe_error *err);
+mhe_status mhi_table_read(const char *path, mhi_table_body body, mhi_table **table, mhe_error *err);
 
 /* Steps to the next line; 0 at the end of the text. */
 int32_t mhi_table_next(mhi_table_reader *reader);
@@ -40,6 +43,9 @@ mhe_status mhi_table_split(mhi_table_reader *reader, char separator);
  * come out, but do by another of these, that one is taken. Empty cells beyond `expected` at the
  * end are dropped. expected < 0: unknown. */
 mhe_status mhi_table_split_row(mhi_table_reader *reader, int32_t expected);
+
+/* After a row: gives back the text before it, a parcel at a time, where it is the reader's own. */
+void mhi_table_give_back(mhi_table_reader *reader);
 
 /* Takes cells from `first` on as the labels, `width` columns each. */
 mhe_status mhi_table_labels(mhi_table_reader *reader, int32_t first, int32_t width);

@@ -143,6 +143,7 @@ mhe_status mhi_table_row(mhi_table_reader *reader, int32_t first) {
         status = take_value(reader, i, reader->cells[first + 1 + i], &row[i]);
     }
     table->n_rows += status == MHE_OK;
+    mhi_table_give_back(reader);
     return status;
 }
 
