@@ -286,26 +286,23 @@ static int32_t solved(const qp *q, const qp_limits *limits) {
            q->complementarity <= limits->complementarity;
 }
 
-/* Does the step get anywhere? */
-static int32_t is_poor(const qp *q, double barrier) {
-    const double length = longest(q);
-    return length < SHORT || barrier_after(q, length) > 0.9 * barrier;
-}
-
 /* One iteration, with the mean of t z aimed at no lower than `least`; the length of its step. */
 static double advance(qp *q, double barrier, double least) {
     step(q, 0, 0);
+    double length = longest(q);
     if (q->n_inequalities > 0) { /* Mehrotra: what the pure Newton step would leave, cubed */
-        const double left = barrier_after(q, longest(q)) / barrier;
+        const double left = barrier_after(q, length) / barrier;
         step(q, fmax(least, left * left * left * barrier), 1);
-        if (is_poor(q, barrier)) { /* his corrector may cycle; the plain step does not */
-            step(q, fmax(least, 0.1 * barrier), 0);
+        length = longest(q);
+        if (length < SHORT || barrier_after(q, length) > 0.9 * barrier) {
+            step(q, fmax(least, 0.1 * barrier), 0); /* his corrector may cycle, this does not */
+            length = longest(q);
         }
-        if (longest(q) < SHORT) { /* too far from the central path: back to it first */
+        if (length < SHORT) { /* too far from the central path: back to it first */
             step(q, barrier, 0);
+            length = longest(q);
         }
     }
-    double length = longest(q);
     length = length < 1 ? NEAREST * length : 1;
     move(q, length);
     return length;
