@@ -17,7 +17,7 @@ typedef struct series {
 
 struct results {
     mhe_estimator_info info;
-    series estimates, motion, forces, markers, torques, quality;
+    series estimates, motion, forces, markers, residuals, torques, emg, quality;
     matlab *matlab; /* NULL: no such file */
     int32_t csv;
     double *row; /* of the widest file */
@@ -130,6 +130,17 @@ static mhe_status open_all(results *r, mhi_outbox *outbox, const mhi_recording *
     if (status == MHE_OK) {
         status = open_markers(r, outbox, recording, &labels, err);
     }
+    labels.n = 0;
+    add_names(&labels, "", f->marker_names, f->n_markers, "");
+    if (status == MHE_OK) {
+        status = open_series(r, outbox, "marker_residuals", "distances of the markers (m)", &labels,
+                             &r->residuals, err);
+    }
+    labels.n = 0;
+    add_names(&labels, "", f->muscle_names, f->n_muscles, "");
+    if (status == MHE_OK) {
+        status = open_series(r, outbox, "emg", "EMG that was tracked", &labels, &r->emg, err);
+    }
     const names of_quality = {.owner = r, .list = quality, .n = 6};
     return status == MHE_OK ? open_series(r, outbox, "quality", "quality of each estimate",
                                           &of_quality, &r->quality, err)
@@ -197,7 +208,8 @@ static mhe_status write_row(const series *s, double time, const double *values, 
     return status == MHE_OK && s->table != NULL ? matlab_row(s->table, time, values, err) : status;
 }
 
-mhe_status results_write(results *r, const mhe_estimate *e, mhe_error *err) {
+mhe_status results_write(results *r, const mhe_estimate *e, const double *distance,
+                         const double *emg, mhe_error *err) {
     const mhe_estimator_info *f = &r->info;
     int32_t n = put(r, 0, e->q, f->n_q);
     n = put(r, n, e->qdot, f->n_q);
@@ -215,6 +227,12 @@ mhe_status results_write(results *r, const mhe_estimate *e, mhe_error *err) {
     }
     if (status == MHE_OK) {
         status = write_row(&r->markers, e->time, e->markers, err);
+    }
+    if (status == MHE_OK) {
+        status = write_row(&r->residuals, e->time, distance, err);
+    }
+    if (status == MHE_OK) {
+        status = write_row(&r->emg, e->time, emg, err);
     }
     if (status == MHE_OK) {
         n = put(r, 0, e->moment, f->n_q);

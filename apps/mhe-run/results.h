@@ -10,13 +10,17 @@
 
 typedef struct results results;
 
-/* Opens estimates, forces, torques and quality (.sto), markers.trc and motion.sto in the outbox;
- * with "csv" among the formats the same as .csv, with "mat" in results.mat. Markers there are in m.
+/* Opens estimates, forces, torques, marker_residuals, emg and quality (.sto), markers.trc and
+ * motion.sto in the outbox; with "csv" among the formats the same as .csv, with "mat" in
+ * results.mat. Markers there are in m.
  */
 mhe_status results_open(mhi_outbox *outbox, const mhe_estimator_info *info,
                         const mhi_recording *recording, const mhe_text_list *formats,
                         results **result, mhe_error *err);
-mhe_status results_write(results *result, const mhe_estimate *estimate, mhe_error *err);
+/* `distance` [n_markers] m of measured and estimated markers, `emg` [n_muscles] that was tracked.
+ */
+mhe_status results_write(results *result, const mhe_estimate *estimate, const double *distance,
+                         const double *emg, mhe_error *err);
 void results_close(results *result);
 
 #endif

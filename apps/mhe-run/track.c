@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "track.h"
 
+#include "diagnosis.h"
 #include "estimator/create.h"
 #include "measure.h"
 #include "picture.h"
 #include "progress.h"
+#include "report.h"
 #include "results.h"
 #include "summary.h"
 
@@ -23,6 +25,7 @@ typedef struct tracking {
     mhe_estimator *estimator;
     mhi_recording *recording;
     mhi_errors *errors;
+    diagnosis *diagnosis;
     mhi_outbox *outbox;
     results *results;
     summary summary;
@@ -50,6 +53,9 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         status = mhi_outbox_open(s->out, &t->outbox, err);
     }
     if (status == MHE_OK && !s->check_only) {
+        status = diagnosis_create(&t->summary.info, s->run, t->recording, &t->diagnosis, err);
+    }
+    if (status == MHE_OK && !s->check_only) {
         status = results_open(t->outbox, &t->summary.info, t->recording, &s->run->output.formats,
                               &t->results, err);
     }
@@ -57,7 +63,9 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
 }
 
 static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_error *err) {
-    mhe_status status = results_write(t->results, estimate, err);
+    diagnosis_add(t->diagnosis, estimate);
+    mhe_status status = results_write(t->results, estimate, diagnosis_distances(t->diagnosis),
+                                      diagnosis_emg(t->diagnosis), err);
     if (status == MHE_OK) {
         status = summary_add(&t->summary, estimate, err);
     }
@@ -130,10 +138,15 @@ static void draw(tracking *t) {
 
 static void tell(const tracking *t) {
     mhi_text text = {0};
+    mhe_error why = {0};
     summary_lines(&t->summary, &text);
-    mhi_text_add(&text, "results in %s\n", t->setup->out);
+    diagnosis_lines(t->diagnosis, &text);
     if (!text.failed) {
         (void)fputs(text.data, stdout);
+        (void)printf("results in %s\n", t->setup->out);
+        if (report_write(t->setup->out, t->setup->run->name, text.data, &why) != MHE_OK) {
+            t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
+        }
     }
     mhi_text_free(&text);
 }
@@ -185,6 +198,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     results_close(t.results);
     mhi_outbox_close(t.outbox);
     mhi_errors_free(t.errors);
+    diagnosis_free(t.diagnosis);
     mhi_recording_free(t.recording);
     mhe_estimator_close(t.estimator);
     summary_free(&t.summary);

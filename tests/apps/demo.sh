@@ -22,7 +22,8 @@ number() { sed -n "s/.*\"$1\":[[:space:]]*\\([-0-9.e]*\\).*/\\1/p" "$2/summary.j
 holds() { awk "BEGIN { exit !($1) }"; }
 
 "$bin/mhe-run" "$demo" --out result --quiet > out.txt 2> err.txt || fail "exit status $?: $(cat err.txt)"
-for file in estimates.sto forces.sto markers.trc torques.sto quality.sto config.yaml summary.json; do
+for file in estimates.sto forces.sto markers.trc torques.sto quality.sto marker_residuals.sto emg.sto \
+    report.html config.yaml summary.json; do
     [ -s "result/$file" ] || fail "no $file"
 done
 find result -name '.*' -type f | grep . && fail "temporary files are left"
@@ -45,6 +46,14 @@ for set in formulation=activation costs.0=mhe.cost.min-excitation bounds.residua
     "$bin/mhe-run" "$demo" --out other --quiet --set "$set" --set horizon.ratio=6 \
         --set horizon.window=3 > /dev/null 2> err.txt || fail "--set $set: $(cat err.txt)"
 done
+
+# Two labels exchanged are named; a run without mistakes names none.
+grep -q 'look exchanged' out.txt && fail "labels are said to be exchanged: $(cat out.txt)"
+sed '4{s/EPICl/OTHER/;s/STYLu/EPICl/;s/OTHER/STYLu/}' "$2/models/arm19/demo_markers.trc" > exchanged.trc
+"$bin/mhe-run" "$demo" --out exchanged --quiet --set "data.markers=$PWD/exchanged.trc" --set costs.0.markers=1e5 \
+    > exchanged.txt 2>> err.txt || fail "exchanged labels: $(cat err.txt)"
+grep -q 'markers EPICl and STYLu look exchanged' exchanged.txt || fail "exchanged: $(cat exchanged.txt)"
+grep -q 'look exchanged' exchanged/report.html || fail "report.html does not tell of exchanged labels"
 
 # Ctrl-C: the files are complete as far as they go, and the message says how far.
 timeout 100 "$bin/mhe-run" "$demo" --out cut --quiet --set horizon.ratio=1 --set horizon.window=22 > /dev/null 2> cut.txt &

@@ -63,7 +63,7 @@ static void write_all(const mhe_text_list *formats) {
                                 .moment = v + 13,
                                 .residual = v + 15,
                                 .markers = v + 16};
-        assert_int_equal(results_write(r, &e, &err), MHE_OK);
+        assert_int_equal(results_write(r, &e, v + 16, v + 4, &err), MHE_OK);
     }
     assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
     assert_string_equal(err.text, "");

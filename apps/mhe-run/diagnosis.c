@@ -1,0 +1,255 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "diagnosis.h"
+
+#include "base/arena.h"
+
+#include <math.h>
+#include <string.h>
+
+#define NAMED 3          /* worst ones named in a line */
+#define FAR 0.03         /* m: a marker this far off is worth a word */
+#define EXCHANGED 0.04   /* m: two markers this far off may be exchanged ... */
+#define FITS_BETTER 0.25 /* ... if their squares shrink to this share when they are */
+#define AT_BOUND 0.999   /* share of the largest activation */
+#define OFTEN 0.1        /* share of estimates */
+#define LARGE_TORQUE 0.5 /* residual torque over the muscles' moment, RMS */
+#define DISAGREES 0.15   /* RMS difference of EMG and estimate */
+
+/* Sums over the estimates. */
+typedef struct tally {
+    double squares, most;
+    int32_t n, missing;
+} tally;
+
+struct diagnosis {
+    const mhe_estimator_info *info;
+    const mhi_run *run;
+    const mhi_recording *recording;
+    int32_t frame; /* of the recording, of the last estimate */
+    int32_t n, n_seen, n_wanted;
+    double *distance, *emg;
+    tally *markers, *muscles, *torques, *moments;
+    int32_t *at_bound;             /* [n_muscles] */
+    int32_t *exchanged, *compared; /* [n_markers x n_markers], of pairs i < j */
+    mhi_arena arena;
+};
+
+mhe_status diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
+                            const mhi_recording *recording, diagnosis **result, mhe_error *err) {
+    mhi_arena arena = {0};
+    diagnosis *d = MHI_TAKE(&arena, diagnosis, 1);
+    const int32_t n_k = info->n_markers;
+    *result = NULL;
+    if (d == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    d->info = info;
+    d->run = run;
+    d->recording = recording;
+    d->distance = MHI_TAKE(&arena, double, n_k);
+    d->emg = MHI_TAKE(&arena, double, info->n_muscles);
+    d->markers = MHI_TAKE(&arena, tally, n_k);
+    d->muscles = MHI_TAKE(&arena, tally, info->n_muscles);
+    d->torques = MHI_TAKE(&arena, tally, info->n_q);
+    d->moments = MHI_TAKE(&arena, tally, info->n_q);
+    d->at_bound = MHI_TAKE(&arena, int32_t, info->n_muscles);
+    d->exchanged = MHI_TAKE(&arena, int32_t, n_k * n_k);
+    d->compared = MHI_TAKE(&arena, int32_t, n_k * n_k);
+    d->arena = arena;
+    if (!d->distance || !d->emg || !d->markers || !d->muscles || !d->torques || !d->moments ||
+        !d->at_bound || !d->exchanged || !d->compared) {
+        diagnosis_free(d);
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    *result = d;
+    return MHE_OK;
+}
+
+void diagnosis_free(diagnosis *d) {
+    if (d != NULL) {
+        mhi_arena arena = d->arena;
+        mhi_arena_free(&arena);
+    }
+}
+
+static void count(tally *t, double value) {
+    if (isnan(value)) {
+        t->missing++;
+        return;
+    }
+    t->squares += value * value;
+    t->most = fmax(t->most, fabs(value));
+    t->n++;
+}
+
+static double rms(const tally *t) {
+    return t->n == 0 ? 0 : sqrt(t->squares / t->n);
+}
+
+static double apart2(const double *a, const double *b) {
+    double sum = 0;
+    for (int32_t i = 0; i < 3; i++) {
+        sum += (a[i] - b[i]) * (a[i] - b[i]);
+    }
+    return sum;
+}
+
+static void add_markers(diagnosis *d, const double *measured, const double *estimated) {
+    const int32_t n_k = d->info->n_markers;
+    for (int32_t i = 0; i < n_k; i++) {
+        d->distance[i] = measured == NULL ? NAN : sqrt(apart2(measured + 3 * i, estimated + 3 * i));
+        count(&d->markers[i], d->distance[i]);
+        d->n_seen += !isnan(d->distance[i]);
+        d->n_wanted++;
+    }
+    for (int32_t i = 0; i < n_k; i++) {
+        for (int32_t j = i + 1; j < n_k; j++) {
+            const double as_is = d->distance[i] * d->distance[i] + d->distance[j] * d->distance[j];
+            if (isnan(as_is)) {
+                continue;
+            }
+            const double crossed = apart2(measured + 3 * i, estimated + 3 * j) +
+                                   apart2(measured + 3 * j, estimated + 3 * i);
+            d->compared[i * n_k + j]++;
+            d->exchanged[i * n_k + j] +=
+                as_is > 2 * EXCHANGED * EXCHANGED && crossed < FITS_BETTER * as_is;
+        }
+    }
+}
+
+void diagnosis_add(diagnosis *d, const mhe_estimate *e) {
+    const mhe_estimator_info *f = d->info;
+    const mhi_recording *r = d->recording;
+    while (d->frame + 1 < r->n_frames &&
+           fabs(r->time[d->frame + 1] - e->time) <= fabs(r->time[d->frame] - e->time)) {
+        d->frame++;
+    }
+    const ptrdiff_t k = d->frame, late = k - d->run->data.emg_delay;
+    d->n++;
+    add_markers(d, r->markers == NULL ? NULL : r->markers + k * 3 * f->n_markers, e->markers);
+    const double *control = e->excitation != NULL ? e->excitation : e->activation;
+    const double most =
+        e->excitation != NULL ? d->run->bounds.excitation_max : d->run->bounds.activation_max;
+    for (int32_t i = 0; i < f->n_muscles; i++) {
+        d->emg[i] = r->emg == NULL ? NAN : r->emg[(late < 0 ? 0 : late) * f->n_muscles + i];
+        count(&d->muscles[i], control[i] - d->emg[i]);
+        d->at_bound[i] += control[i] >= AT_BOUND * most;
+    }
+    for (int32_t i = 0; i < f->n_q; i++) {
+        count(&d->moments[i], e->moment[i]);
+        count(&d->torques[i], i < f->n_residual_torques ? e->residual[i] : 0);
+    }
+}
+
+const double *diagnosis_distances(const diagnosis *d) {
+    return d->distance;
+}
+
+const double *diagnosis_emg(const diagnosis *d) {
+    return d->emg;
+}
+
+/* Up to NAMED of n tallies above `least`, the largest RMS first; their number. */
+static int32_t worst(const tally *all, int32_t n, double least, int32_t *which) {
+    int32_t found = 0;
+    for (int32_t i = 0; i < n; i++) {
+        if (rms(&all[i]) <= least) {
+            continue;
+        }
+        int32_t at = found < NAMED ? found++ : NAMED;
+        while (at > 0 && rms(&all[i]) > rms(&all[which[at - 1]])) {
+            if (at < NAMED) {
+                which[at] = which[at - 1];
+            }
+            at--;
+        }
+        if (at < NAMED) {
+            which[at] = i;
+        }
+    }
+    return found;
+}
+
+static void marker_lines(const diagnosis *d, mhi_text *out) {
+    const mhe_estimator_info *f = d->info;
+    int32_t which[NAMED], n = worst(d->markers, f->n_markers, 0, which);
+    if (d->n_wanted == 0 || n == 0) {
+        mhi_text_add(out, "markers: none measured\n");
+        return;
+    }
+    mhi_text_add(out, "markers: %.1f %% of the samples missing; farthest from the estimate (RMS):",
+                 100.0 * (d->n_wanted - d->n_seen) / d->n_wanted);
+    for (int32_t i = 0; i < n; i++) {
+        mhi_text_add(out, "%s %s %.1f mm", i == 0 ? "" : ",", f->marker_names[which[i]],
+                     1e3 * rms(&d->markers[which[i]]));
+    }
+    mhi_text_add(out, "\n");
+    for (int32_t i = 0; i < f->n_markers; i++) {
+        for (int32_t j = i + 1; j < f->n_markers; j++) {
+            const int32_t at = i * f->n_markers + j;
+            if (d->exchanged[at] > 0 && d->exchanged[at] >= OFTEN * d->compared[at]) {
+                mhi_text_add(out,
+                             "markers %s and %s look exchanged in %.0f %% of the frames\n"
+                             "try: exchange their labels in the marker file\n",
+                             f->marker_names[i], f->marker_names[j],
+                             100.0 * d->exchanged[at] / d->compared[at]);
+            }
+        }
+    }
+    if (rms(&d->markers[which[0]]) > FAR) {
+        mhi_text_add(out,
+                     "try: check the place of %s on the model and the model's scale; let "
+                     "outliers pull less with 'huber' of the marker cost\n",
+                     f->marker_names[which[0]]);
+    }
+}
+
+static void muscle_lines(const diagnosis *d, mhi_text *out) {
+    const mhe_estimator_info *f = d->info;
+    int32_t n = 0;
+    for (int32_t i = 0; i < f->n_muscles; i++) {
+        if (d->at_bound[i] > OFTEN * d->n) {
+            mhi_text_add(out, "%s %s (%.0f %%)", n++ == 0 ? "muscles at full activation:" : ",",
+                         f->muscle_names[i], 100.0 * d->at_bound[i] / d->n);
+        }
+    }
+    if (n > 0) {
+        mhi_text_add(out, "\ntry: residual torques at their joints, stronger muscles (the person "
+                          "may be), or a smaller sigma of the activations\n");
+    }
+    int32_t which[NAMED];
+    n = worst(d->muscles, f->n_muscles, DISAGREES, which);
+    for (int32_t i = 0; i < n; i++) {
+        mhi_text_add(out, "%s %s %.2f", i == 0 ? "EMG and estimate disagree (RMS, of 1):" : ",",
+                     f->muscle_names[which[i]], rms(&d->muscles[which[i]]));
+    }
+    if (n > 0) {
+        mhi_text_add(out, "\ntry: check electrode, MVC value and mapping of these channels, or "
+                          "give their EMG a larger sigma\n");
+    }
+}
+
+static void torque_lines(const diagnosis *d, mhi_text *out) {
+    const mhe_estimator_info *f = d->info;
+    int32_t n = 0;
+    for (int32_t i = 0; i < f->n_q; i++) {
+        const double torque = rms(&d->torques[i]), moment = rms(&d->moments[i]);
+        if (torque > 1 && torque > LARGE_TORQUE * moment) {
+            mhi_text_add(out, "%s %s %.1f N m (muscles %.1f)",
+                         n++ == 0 ? "large residual torques (RMS):" : ",", f->coordinate_names[i],
+                         torque, moment);
+        }
+    }
+    if (n > 0) {
+        mhi_text_add(out, "\ntry: expected where muscles or supports are missing in the model; "
+                          "elsewhere a smaller sigma of the residual torque there\n");
+    }
+}
+
+void diagnosis_lines(const diagnosis *d, mhi_text *out) {
+    if (d->n > 0) {
+        marker_lines(d, out);
+        muscle_lines(d, out);
+        torque_lines(d, out);
+    }
+}

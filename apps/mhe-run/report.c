@@ -1,0 +1,173 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "report.h"
+
+#include "io/sink.h"
+#include "io/table.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+
+#define WIDTH 300.0
+#define HEIGHT 120.0
+#define POINTS 600 /* of a line; more would not be seen */
+#define DEGREES (180 / 3.14159265358979323846)
+
+/* Text as it may stand in HTML. */
+static void add_escaped(mhi_text *out, const char *text) {
+    for (; *text != '\0'; text++) {
+        switch (*text) {
+        case '<':
+            mhi_text_add(out, "&lt;");
+            break;
+        case '>':
+            mhi_text_add(out, "&gt;");
+            break;
+        case '&':
+            mhi_text_add(out, "&amp;");
+            break;
+        default:
+            mhi_text_add(out, "%c", *text);
+        }
+    }
+}
+
+static double value_at(const mhi_table *t, int32_t row, int32_t column, double scale) {
+    return scale * t->values[(ptrdiff_t)row * t->n_columns + column];
+}
+
+static void widen(const mhi_table *t, int32_t column, double scale, double range[2]) {
+    for (int32_t k = 0; t != NULL && column >= 0 && k < t->n_rows; k++) {
+        range[0] = fmin(range[0], value_at(t, k, column, scale)); /* of a number and NaN: it */
+        range[1] = fmax(range[1], value_at(t, k, column, scale));
+    }
+}
+
+/* A line through the rows of a column; missing values break it. */
+static void add_line(mhi_text *out, const mhi_table *t, int32_t column, double scale,
+                     const double range[2], const char *style) {
+    const int32_t step = t->n_rows / POINTS + 1;
+    const double span = t->time[t->n_rows - 1] - t->time[0];
+    int open = 0;
+    mhi_text_add(out, "<path class=\"%s\" d=\"", style);
+    for (int32_t k = 0; k < t->n_rows; k += step) {
+        const double y = value_at(t, k, column, scale);
+        if (isnan(y)) {
+            open = 0;
+            continue;
+        }
+        mhi_text_add(out, "%c%.1f %.1f", open ? 'L' : 'M',
+                     span > 0 ? WIDTH * (t->time[k] - t->time[0]) / span : 0,
+                     HEIGHT * (range[1] - y) / (range[1] - range[0]));
+        open = 1;
+    }
+    mhi_text_add(out, "\"/>");
+}
+
+/* One small picture: a column, and beside it one of a second table (column -1: none). */
+static void add_panel(mhi_text *out, const char *name, const mhi_table *t, int32_t column,
+                      const mhi_table *other, int32_t other_column, double scale, double least) {
+    double range[2] = {INFINITY, -INFINITY};
+    widen(t, column, scale, range);
+    widen(other, other_column, scale, range);
+    if (!(range[0] <= range[1])) {
+        return;
+    }
+    if (range[1] - range[0] < least) {
+        const double middle = 0.5 * (range[0] + range[1]);
+        range[0] = middle - 0.5 * least;
+        range[1] = middle + 0.5 * least;
+    }
+    mhi_text_add(out, "<figure><figcaption>");
+    add_escaped(out, name);
+    mhi_text_add(out,
+                 " <small>%.4g to %.4g</small></figcaption><svg viewBox=\"0 -2 %g %g\" "
+                 "role=\"img\">",
+                 range[0], range[1], WIDTH, HEIGHT + 4);
+    if (other != NULL && other_column >= 0) {
+        add_line(out, other, other_column, scale, range, "measured");
+    }
+    add_line(out, t, column, scale, range, "estimated");
+    mhi_text_add(out, "</svg></figure>\n");
+}
+
+static void add_all(mhi_text *out, const char *heading, const mhi_table *t, const char *prefix,
+                    const mhi_table *other, double scale, double least) {
+    const size_t length = strlen(prefix);
+    if (t == NULL) {
+        return;
+    }
+    mhi_text_add(out, "<h2>%s</h2>\n<div>\n", heading);
+    for (int32_t i = 0; i < t->n_labels; i++) {
+        if (strncmp(t->labels[i], prefix, length) == 0) {
+            const char *name = t->labels[i] + length;
+            add_panel(out, name, t, i, other, other == NULL ? -1 : mhi_table_find(other, name),
+                      scale, least);
+        }
+    }
+    mhi_text_add(out, "</div>\n");
+}
+
+static const char head[] =
+    "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><style>\n"
+    "body{font:15px/1.4 sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}\n"
+    "div{display:grid;grid-template-columns:repeat(auto-fill,minmax(230px,1fr));gap:10px}\n"
+    "figure{margin:0}figcaption{overflow-wrap:anywhere}small{color:#666}\n"
+    "svg{width:100%;background:#f6f6f6}path{fill:none;stroke-width:1.5}\n"
+    ".estimated{stroke:#1f5fa8}.measured{stroke:#d9822b}pre{white-space:pre-wrap}\n"
+    "</style>\n";
+
+static void compose(mhi_text *out, const char *name, const char *summary,
+                    mhi_table *const tables[5]) {
+    mhi_text_add(out, "%s<title>", head);
+    add_escaped(out, name);
+    mhi_text_add(out, "</title>\n<h1>");
+    add_escaped(out, name);
+    mhi_text_add(out, "</h1>\n<pre>");
+    add_escaped(out, summary);
+    mhi_text_add(out,
+                 "</pre>\n<p>Blue: estimated. Orange: measured. Time from %.4g to %.4g s.</p>\n",
+                 tables[0]->time[0], tables[0]->time[tables[0]->n_rows - 1]);
+    add_all(out, "Joint coordinates (degrees; sliders: 57.3 m)", tables[0], "q_", NULL, DEGREES, 1);
+    add_all(out, "Activation against EMG", tables[0], "a_", tables[3], 1, 0.1);
+    add_all(out, "Muscle forces (N)", tables[1], "", NULL, 1, 10);
+    add_all(out, "Distance of markers (mm)", tables[2], "", NULL, 1e3, 1);
+    add_all(out, "Solve time (ms)", tables[4], "solve_", NULL, 1, 1);
+}
+
+mhe_status report_write(const char *dir, const char *name, const char *summary, mhe_error *err) {
+    static const char *const files[] = {"estimates.sto", "forces.sto", "marker_residuals.sto",
+                                        "emg.sto", "quality.sto"};
+    mhi_table *tables[5] = {NULL};
+    mhi_text page = {0};
+    mhi_outbox *outbox = NULL;
+    mhe_status status = MHE_OK;
+    for (int i = 0; i < 5 && status == MHE_OK; i++) {
+        char path[4096];
+        const int n = snprintf(path, sizeof path, "%s/%s", dir, files[i]);
+        if (n < 0 || (size_t)n >= sizeof path) {
+            status = mhe_fail(err, MHE_E_ARGUMENT, "%s: the path is too long", dir);
+        } else if (i == 0) {
+            status = mhi_sto_read(path, &tables[i], err);
+        } else { /* without muscles or markers a table has no columns and cannot be read */
+            (void)mhi_sto_read(path, &tables[i], NULL);
+        }
+    }
+    if (status == MHE_OK) {
+        compose(&page, name, summary, tables);
+        status = page.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                             : mhi_outbox_open(dir, &outbox, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_text(outbox, "report.html", page.data, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_commit(outbox, err);
+    }
+    mhi_outbox_close(outbox);
+    mhi_text_free(&page);
+    for (int i = 0; i < 5; i++) {
+        mhi_table_free(tables[i]);
+    }
+    return status;
+}
