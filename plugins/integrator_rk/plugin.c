@@ -16,7 +16,7 @@ static const mhe_option rk_options[] = {
     MHE_OPT_REAL(struct rk_config, activation_step, 1.7, 0.01, 10, "1",
                  "Longest step of the activations, in their shortest time constant where it "
                  "starts."),
-    MHE_OPT_REAL(struct rk_config, tolerance, 0, 0, 1e-2, "1",
+    MHE_OPT_REAL(struct rk_config, tolerance, 5e-6, 0, 1e-2, "1",
                  "A Gauss step that may err by more, in units of max(1, |qdot|), at a kink or a "
                  "jump of the forces is halved; 0: never."),
 };

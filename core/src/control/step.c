@@ -296,7 +296,7 @@ static mhe_status solve_once(mhi_step_work *w, mhi_trajectory *t, mhe_solve_info
     return status;
 }
 
-/* A and B of every interval. */
+/* A and B of every interval; the same whether the solution was found now or read back. */
 static mhe_status linearise(mhi_step_work *w, mhi_arena *arena, mhi_trajectory *t, mhe_error *err) {
     const mhe_stage_problem *face = mhi_ocp_face(w->ocp);
     const ptrdiff_t n_A = (ptrdiff_t)t->n_x * t->n_x, n_B = (ptrdiff_t)t->n_x * t->n_u;
@@ -306,6 +306,7 @@ static mhe_status linearise(mhi_step_work *w, mhi_arena *arena, mhi_trajectory *
     if (t->A == NULL || t->B == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
+    mhi_ocp_forget(w->ocp);
     for (int32_t k = 0; k < t->n && status == MHE_OK; k++) {
         const mhe_stage_values out = {
             .size = sizeof out, .x_next = w->x, .A = t->A + k * n_A, .B = t->B + k * n_B};

@@ -213,6 +213,13 @@ void mhi_ocp_shift(mhi_ocp *ocp) {
     }
 }
 
+void mhi_ocp_forget(mhi_ocp *ocp) {
+    const ptrdiff_t n = (ptrdiff_t)ocp->face.n_intervals * ocp->memory_size;
+    for (ptrdiff_t i = 0; i < n; i++) {
+        ocp->memory[i] = 0;
+    }
+}
+
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight) {
     memcpy(ocp->prior_centre, centre, sizeof(double) * (size_t)ocp->face.n_x);
     memcpy(ocp->prior_weight, weight, sizeof(double) * (size_t)ocp->face.n_x);

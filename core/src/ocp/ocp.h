@@ -47,6 +47,8 @@ double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
 /* The window moves on by one interval: what the integrator keeps of interval k + 1 becomes that of
  * k, the last one's that of the new one too. */
 void mhi_ocp_shift(mhi_ocp *ocp);
+/* What the integrator keeps of earlier calls is gone: the next values do not depend on them. */
+void mhi_ocp_forget(mhi_ocp *ocp);
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval);    /* s, of all intervals */
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time); /* s, told to costs */
 
