@@ -2,8 +2,9 @@
 /* weighted_terms.h: a cost that is a list of weighted signals.
  *
  * Each term reads one signal y and gives r = sqrt(weight) (y - target), where the target is the
- * measured y_ref or 0. A cost plugin says in create() which terms it has and hands the other
- * functions below to the core as they are. */
+ * measured y_ref or 0; a missing y_ref leaves no residual, or one towards 0 with another weight. A
+ * cost plugin says in create() which terms it has and hands the other functions below to the core
+ * as they are. */
 #ifndef WEIGHTED_TERMS_H
 #define WEIGHTED_TERMS_H
 
@@ -16,6 +17,7 @@ typedef struct weighted_term {
     const char *signal;
     double weight;           /* [1 / unit of the signal squared]; 0 drops the term */
     int32_t tracks;          /* 1: towards the measured signal; 0: towards 0 */
+    double missing;          /* weight towards 0 of a tracked sample that is missing */
     int32_t optional;        /* 1: dropped where the problem has no such signal */
     const uint8_t *selected; /* [n_y] 0: this entry does not count; NULL: all count */
 } weighted_term;
@@ -26,6 +28,8 @@ typedef struct weighted_terms {
     int32_t n_res;
     double *scale;   /* [n_res] sqrt(weight) */
     double *tracked; /* [n_res] 1: y_ref is subtracted */
+    double *missing; /* [n_res] sqrt(weight) where y_ref is NaN; 0: no residual there */
+    int32_t fills_missing;
 } weighted_terms;
 
 static void weighted_terms_destroy(void *self) {
@@ -51,6 +55,8 @@ static mhe_status weighted_terms_add(weighted_terms *all, const mhe_problem *pro
         int32_t counts = term->selected == NULL || term->selected[i];
         all->scale[all->n_res] = counts ? sqrt(term->weight) : 0;
         all->tracked[all->n_res] = counts && term->tracks;
+        all->missing[all->n_res] = counts && term->tracks ? sqrt(term->missing) : 0;
+        all->fills_missing |= all->missing[all->n_res] > 0;
     }
     return MHE_OK;
 }
@@ -64,11 +70,12 @@ static mhe_status weighted_terms_create(const mhe_problem *problem, const weight
         n_most += problem->find_signal(problem, terms[i].signal, &n, NULL) >= 0 ? (size_t)n : 0;
     }
     weighted_terms *all = calloc(1, sizeof *all);
-    if (all == NULL || (all->scale = calloc(2 * n_most, sizeof(double))) == NULL) {
+    if (all == NULL || (all->scale = calloc(3 * n_most, sizeof(double))) == NULL) {
         free(all);
         return mhe_fail(err, MHE_E_MEMORY, "no memory for %zu residuals", n_most);
     }
     all->tracked = all->scale + n_most;
+    all->missing = all->tracked + n_most;
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < n_terms && status == MHE_OK; i++) {
         status = weighted_terms_add(all, problem, &terms[i], err);
@@ -95,15 +102,23 @@ static mhe_status weighted_terms_layout(const void *self, const mhe_problem *pro
     out->n_res = all->n_res;
     out->jacobian = MHE_JACOBIAN_DIAGONAL;
     out->res_unit = "1";
+    out->fills_missing = all->fills_missing;
     return MHE_OK;
+}
+
+static int32_t weighted_terms_lacks(const weighted_terms *all, const mhe_stage *stage, int32_t i) {
+    return all->missing[i] > 0 && isnan(stage->y_ref[i]);
 }
 
 static mhe_status weighted_terms_residual(const void *self, const mhe_stage *stage, double *r,
                                           mhe_error *err) {
     const weighted_terms *all = self;
     (void)err;
-    for (int32_t i = 0; i < stage->ny; i++) { /* NaN of a missing sample goes through */
-        r[i] = all->scale[i] * (all->tracked[i] != 0 ? stage->y[i] - stage->y_ref[i] : stage->y[i]);
+    for (int32_t i = 0; i < stage->ny; i++) { /* NaN of other missing samples goes through */
+        const double y = stage->y[i];
+        r[i] = weighted_terms_lacks(all, stage, i)
+                   ? all->missing[i] * y
+                   : all->scale[i] * (all->tracked[i] != 0 ? y - stage->y_ref[i] : y);
     }
     return MHE_OK;
 }
@@ -113,7 +128,7 @@ static mhe_status weighted_terms_jacobian(const void *self, const mhe_stage *sta
     const weighted_terms *all = self;
     (void)err;
     for (int32_t i = 0; i < stage->ny; i++) { /* the diagonal */
-        J[i] = all->scale[i];
+        J[i] = weighted_terms_lacks(all, stage, i) ? all->missing[i] : all->scale[i];
     }
     return MHE_OK;
 }

@@ -11,20 +11,28 @@
 const char arguments_help[] =
     "Estimates joint angles, activations and muscle forces from markers and EMG.\n"
     "\n"
-    "  mhe-run CONFIG.yaml [--out DIR] [--set path.to.key=value]... [--quiet]\n"
+    "  mhe-run CONFIG.yaml [--out DIR] [--set path.to.key=value]... [--quiet] [--realtime]\n"
     "  mhe-run --check CONFIG.yaml [--set path.to.key=value]...\n"
     "  mhe-run --list-plugins [--json]\n"
     "  mhe-run --describe ID [--json | --markdown]\n"
     "  mhe-run --version | --help\n"
     "\n"
+    "--realtime feeds the recorded frames by the clock, as they would come live: a frame that "
+    "comes\n"
+    "while another is in work is skipped when a newer one is there. Unless the config says "
+    "otherwise\n"
+    "estimates are of the newest frame and each ends before the next one; rate, latency, jitter "
+    "and\n"
+    "missed frames are reported.\n"
     "--describe config shows every key of the config file. Results go to DIR, ./out/<config name>\n"
-    "unless given. Exit status: 0 done; 1 the run failed or was interrupted; 2 the command line, "
+    "unless given. Exit status: 0 done; 1 the run failed (every solve did, too) or was "
+    "interrupted; 2 the command line, "
     "the\n"
     "configuration or an input file is wrong.\n";
 
 static const char *const words[] = {"--out",          "--set",  "--quiet",    "--check",
                                     "--list-plugins", "--json", "--markdown", "--describe",
-                                    "--version",      "--help"};
+                                    "--version",      "--help", "--realtime"};
 
 static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_error *err) {
     const char *word = argv[*i];
@@ -44,6 +52,8 @@ static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_err
     }
     if (strcmp(word, "--quiet") == 0) {
         a->quiet = 1;
+    } else if (strcmp(word, "--realtime") == 0) {
+        a->realtime = 1;
     } else if (strcmp(word, "--list-plugins") == 0) {
         a->mode = MODE_LIST;
     } else if (strcmp(word, "--json") == 0) {

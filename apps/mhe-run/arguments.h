@@ -15,6 +15,7 @@
 typedef struct arguments {
     int mode;
     int quiet;
+    int realtime;
     int32_t format;     /* MHI_FORMAT_* */
     const char *config; /* run, check */
     const char *id;     /* describe */

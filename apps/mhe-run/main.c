@@ -40,7 +40,7 @@ static mhe_status run_config(const arguments *a, const mhe_host *host, mhi_regis
     if (length < 0 || (size_t)length >= sizeof folder) {
         status = mhe_fail(err, MHE_E_ARGUMENT, "the path of the output folder is too long");
     } else {
-        const track_setup setup = {run, host, folder, a->quiet, a->mode == MODE_CHECK};
+        const track_setup setup = {run, host, folder, a->quiet, a->mode == MODE_CHECK, a->realtime};
         status = track(&setup, err);
     }
     if (status == MHE_OK && a->mode == MODE_CHECK) {

@@ -23,6 +23,7 @@ mhe_status summary_add(summary *s, const mhe_estimate *estimate, mhe_error *err)
     s->solve_ms[s->n_solves++] = 1e3 * estimate->solve_time;
     s->n_converged += estimate->status == MHE_FRAME_OK;
     s->n_deadline += estimate->status == MHE_FRAME_DEADLINE;
+    s->n_predicted += estimate->status == MHE_FRAME_PREDICTED;
     s->iterations_sum += estimate->iterations;
     if (estimate->iterations > s->iterations_max) {
         s->iterations_max = estimate->iterations;
@@ -93,6 +94,25 @@ static void add_emg(cJSON *root, const summary *s) {
     add_number(o, "latency_ms", 1e3 * (s->info.delay + emg->lag) + percentile(s, 0.5));
 }
 
+static void add_spread(cJSON *parent, const char *key, const double *sorted_s, int32_t n) {
+    cJSON *o = cJSON_AddObjectToObject(parent, key);
+    add_number(o, "p50", 1e3 * measure_percentile(sorted_s, n, 0.5));
+    add_number(o, "p95", 1e3 * measure_percentile(sorted_s, n, 0.95));
+    add_number(o, "p99", 1e3 * measure_percentile(sorted_s, n, 0.99));
+    add_number(o, "p99.9", 1e3 * measure_percentile(sorted_s, n, 0.999));
+    add_number(o, "max", 1e3 * measure_percentile(sorted_s, n, 1));
+}
+
+static void add_realtime(cJSON *root, const summary *s) {
+    const live *l = s->live;
+    cJSON *o = cJSON_AddObjectToObject(root, "realtime");
+    add_number(o, "deadline_ms", 1e3 * l->deadline);
+    add_number(o, "rate_hz", s->n_solves / s->elapsed);
+    add_number(o, "missed_frames", l->n_missed);
+    add_spread(o, "latency_ms", l->latency, l->n_latency);
+    add_spread(o, "jitter_ms", l->jitter, l->n_jitter);
+}
+
 mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
     measure_sort(s->solve_ms, s->n_solves);
     cJSON *root = cJSON_CreateObject();
@@ -116,6 +136,11 @@ mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error
     add_number(iterations, "max", s->iterations_max);
     add_number(root, "deadline_misses", s->n_deadline);
     add_number(root, "peak_rss_mb", peak_rss_mb());
+    add_number(root, "node", s->info.node);
+    add_number(root, "delay_s", s->info.delay);
+    if (s->live != NULL) {
+        add_realtime(root, s);
+    }
     if (s->emg.n_channels > 0) {
         add_emg(root, s);
     }
@@ -141,6 +166,9 @@ void summary_lines(const summary *s, mhi_text *out) {
     if (s->n_solves > 0) {
         mhi_text_add(out, "rate %.1f Hz mean; solve %.2f ms median, %.2f ms p99, %.2f ms max\n",
                      1e3 / mean_ms(s), percentile(s, 0.5), percentile(s, 0.99), percentile(s, 1));
+    }
+    if (s->live != NULL) {
+        live_lines(s->live, s->n_solves / s->elapsed, out);
     }
     const struct {
         const char *what, *unit;

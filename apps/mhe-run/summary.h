@@ -5,6 +5,7 @@
 
 #include "base/text.h"
 #include "estimator/errors.h"
+#include "live.h"
 
 typedef struct summary {
     mhe_estimator_info info;
@@ -12,6 +13,7 @@ typedef struct summary {
     int32_t n_pushed;
     int32_t n_solves;
     int32_t n_converged, n_deadline;
+    int32_t n_predicted; /* of n_solves: the solve failed */
     int32_t iterations_max;
     double iterations_sum;
     double *solve_ms; /* [capacity >= n_solves], owned */
@@ -21,6 +23,7 @@ typedef struct summary {
     const char *alignment; /* a line, or NULL */
     int32_t has_rmse;
     mhi_rmse rmse;
+    const live *live; /* NULL: not by the clock */
 } summary;
 
 mhe_status summary_add(summary *s, const mhe_estimate *estimate, mhe_error *err);

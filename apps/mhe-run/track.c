@@ -29,7 +29,21 @@ typedef struct tracking {
     mhi_outbox *outbox;
     results *results;
     summary summary;
+    live live;
 } tracking;
+
+/* What live use expects where the config leaves it open. */
+static mhe_status open_live(tracking *t, mhe_error *err) {
+    const mhi_run *run = t->setup->run;
+    const double between = run->horizon.ratio / t->recording->rate;
+    t->live.deadline = run->realtime.deadline_ms > 0 ? 1e-3 * run->realtime.deadline_ms : between;
+    mhi_estimator_set_deadline(t->estimator, t->live.deadline);
+    if (strcmp(run->output.node_name, "auto") == 0) {
+        mhi_estimator_set_node(t->estimator, run->horizon.window);
+    }
+    t->summary.live = &t->live;
+    return live_open(&t->live, t->recording->n_frames, err);
+}
 
 static mhe_status open_all(tracking *t, mhe_error *err) {
     const track_setup *s = t->setup;
@@ -45,6 +59,9 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         mhi_estimator_set_start(t->estimator, t->recording->reference.q,
                                 t->recording->reference.qdot);
         status = mhi_errors_create(system, t->recording, &t->errors, err);
+    }
+    if (status == MHE_OK && s->realtime) {
+        status = open_live(t, err);
     }
     if (status == MHE_OK && !s->check_only) {
         t->summary.n_frames = t->recording->n_frames;
@@ -75,29 +92,43 @@ static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_e
     return status;
 }
 
-static mhe_status estimate_all(tracking *t, mhe_error *err) {
+static mhe_status estimate_frame(tracking *t, int32_t k, mhe_error *err) {
     const mhi_recording *r = t->recording;
     const mhe_estimator_info *info = &t->summary.info;
-    progress bar;
-    progress_start(&bar, r->n_frames, t->setup->quiet);
-    mhe_status status = MHE_OK;
-    for (int32_t k = 0; k < r->n_frames && status == MHE_OK && !interrupted; k++) {
-        const mhe_frame frame = {
-            .size = sizeof frame,
-            .time = r->time[k],
-            .markers = r->markers == NULL ? NULL : r->markers + (ptrdiff_t)k * 3 * info->n_markers,
-            .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * info->n_muscles};
-        mhe_estimate estimate = {.size = sizeof estimate};
-        int32_t ready = 0;
-        status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
-        if (status == MHE_OK && ready) {
-            status = take_estimate(t, &estimate, err);
+    const mhe_frame frame = {
+        .size = sizeof frame,
+        .time = r->time[k],
+        .markers = r->markers == NULL ? NULL : r->markers + (ptrdiff_t)k * 3 * info->n_markers,
+        .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * info->n_muscles};
+    mhe_estimate estimate = {.size = sizeof estimate};
+    int32_t ready = 0;
+    mhe_status status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
+    if (status == MHE_OK && ready) {
+        if (t->setup->realtime) {
+            live_estimated(&t->live);
         }
-        t->summary.n_pushed = k + 1;
+        status = take_estimate(t, &estimate, err);
+    }
+    t->summary.n_pushed++;
+    return status;
+}
+
+static mhe_status estimate_all(tracking *t, mhe_error *err) {
+    const int32_t n = t->recording->n_frames;
+    progress bar;
+    progress_start(&bar, n, t->setup->quiet);
+    mhe_status status = MHE_OK;
+    for (int32_t k = 0; k < n && status == MHE_OK && !interrupted; k++) {
+        if (t->setup->realtime) {
+            k = live_wait(&t->live, t->estimator, t->recording->time, n);
+        }
+        status = interrupted ? MHE_OK : estimate_frame(t, k, err);
         progress_update(&bar, k + 1, t->summary.n_solves, t->summary.n_converged);
     }
     t->summary.elapsed = measure_seconds() - bar.begin;
     progress_end(&bar);
+    live_end(&t->live);
+    mhe_estimator_describe(t->estimator, &t->summary.info);
     return status;
 }
 
@@ -164,7 +195,8 @@ static mhe_status finish(tracking *t, mhe_error *err) {
         return status;
     }
     draw(t);
-    if (t->summary.n_converged == 0) {
+    if (t->summary.n_converged == 0 && t->summary.n_predicted < t->summary.n_solves &&
+        !t->setup->realtime) {
         t->setup->host->log(t->setup->host, MHE_LOG_WARNING,
                             "no solve converged; quality.sto says how each ended");
     }
@@ -174,6 +206,11 @@ static mhe_status finish(tracking *t, mhe_error *err) {
             err, MHE_E_INTERRUPTED,
             "interrupted after %d of %d frames; the files hold what was estimated until then",
             t->summary.n_pushed, t->summary.n_frames);
+    }
+    if (t->summary.n_predicted == t->summary.n_solves) {
+        return mhe_fail(err, MHE_E_NUMERIC,
+                        "every solve failed; the files hold the model's predictions, quality.sto "
+                        "says how each ended");
     }
     return MHE_OK;
 }
@@ -202,5 +239,6 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     mhi_recording_free(t.recording);
     mhe_estimator_close(t.estimator);
     summary_free(&t.summary);
+    live_close(&t.live);
     return status;
 }

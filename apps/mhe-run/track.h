@@ -11,6 +11,7 @@ typedef struct track_setup {
     const char *out; /* folder */
     int quiet;
     int check_only; /* open everything, estimate nothing */
+    int realtime;   /* frames come by the clock */
 } track_setup;
 
 /* MHE_E_INTERRUPTED: Ctrl-C or SIGTERM; the files hold what was estimated until then. On any other

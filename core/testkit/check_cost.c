@@ -198,6 +198,23 @@ static void check_nan(mhi_kit *kit, const mhi_probe *probe, cost_case *c, double
     mhi_kit_pass(kit, check);
 }
 
+/* Leaves out each target without which all residuals are finite. */
+static void drop_filled_targets(mhi_kit *kit, const mhi_probe *probe, cost_case *c) {
+    const double *const in[] = {c->y, c->y_ref};
+    double *r = MHI_KIT_TAKE(kit, double, c->layout.n_res);
+    double *const out[] = {r};
+    void *scratch = mhi_kit_take(kit, probe->scratch_bytes);
+    for (int32_t k = 0; k < c->stage.ny; k++) {
+        const double value = c->y_ref[k];
+        c->y_ref[k] = NAN;
+        int finite = probe->call(c, NULL, scratch, in, out, NULL) == MHE_OK;
+        for (int32_t i = 0; i < c->layout.n_res; i++) {
+            finite = finite && isfinite(r[i]);
+        }
+        c->y_ref[k] = finite ? NAN : value;
+    }
+}
+
 static void check_case(mhi_kit *kit, cost_case *c) {
     const double *const in[] = {c->y, c->y_ref};
     const int32_t ny = c->stage.ny, n_res = c->layout.n_res;
@@ -228,7 +245,19 @@ static void check_case(mhi_kit *kit, cost_case *c) {
     }
     set_node(c, 0);
     check_nan(kit, &residual, c, c->y, "NaN in y never gives a finite residual");
-    check_nan(kit, &residual, c, c->y_ref, "a missing target never gives a finite residual");
+    if (!c->layout.fills_missing) {
+        check_nan(kit, &residual, c, c->y_ref, "a missing target never gives a finite residual");
+        return;
+    }
+    drop_filled_targets(kit, &residual, c);
+    mhi_probe_check(kit, &residual, in);
+    if (c->ops->jacobian != NULL) {
+        mhi_probe_check(kit, &jacobian, in);
+        mhi_probe_jacobian(kit, &residual, in, 0, 0, dense_jacobian(kit, c, &jacobian, in),
+                           mhi_arena_format(&kit->arena,
+                                            "jacobian against differences (%s, targets missing)",
+                                            c->title));
+    }
 }
 
 /* Sets the cost up on one problem. Returns whether it took the problem. */

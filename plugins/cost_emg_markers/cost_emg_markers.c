@@ -27,7 +27,8 @@ static const mhe_option emg_markers_options[] = {
                  "Weight on residual torques, where the problem has them."),
     MHE_OPT_TEXTS(struct emg_markers, tracked, 0, "Muscles with EMG; empty: all."),
     MHE_OPT_REAL(struct emg_markers, untracked, 1e4, 0, 1e15, "1",
-                 "Weight on all muscle controls towards 0 when some muscles have no EMG."),
+                 "Weight on all muscle controls towards 0 when some muscles have no EMG; else on "
+                 "a control while its EMG is missing."),
 };
 
 static mhe_status emg_markers_unknown(const mhe_problem *problem, const char *name,
@@ -76,7 +77,11 @@ static mhe_status emg_markers_create(const mhe_host *host, const mhe_problem *pr
     int partial = n_tracked > 0 && n_tracked < problem->n_muscles;
     const weighted_term terms[] = {
         {.signal = "markers", .weight = c->markers, .tracks = 1},
-        {.signal = control, .weight = c->emg, .tracks = 1, .selected = partial ? has_emg : NULL},
+        {.signal = control,
+         .weight = c->emg,
+         .tracks = 1,
+         .missing = partial ? 0 : c->untracked,
+         .selected = partial ? has_emg : NULL},
         {.signal = control, .weight = partial ? c->untracked : 0},
         {.signal = "q", .weight = c->q},
         {.signal = "qdot", .weight = c->qdot},

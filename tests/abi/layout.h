@@ -168,7 +168,7 @@ AT(mhe_problem, marker_names, 56);
 AT(mhe_problem, data, 64);
 AT(mhe_problem, find_signal, 72);
 
-SIZE(mhe_cost_layout, 96);
+SIZE(mhe_cost_layout, 104);
 AT(mhe_cost_layout, size, 0);
 AT(mhe_cost_layout, signal, 4);
 AT(mhe_cost_layout, n_signals, 8);
@@ -177,6 +177,7 @@ AT(mhe_cost_layout, n_res, 76);
 AT(mhe_cost_layout, jacobian, 80);
 AT(mhe_cost_layout, scratch_bytes, 84);
 AT(mhe_cost_layout, res_unit, 88);
+AT(mhe_cost_layout, fills_missing, 96);
 
 SIZE(mhe_stage, 48);
 AT(mhe_stage, size, 0);

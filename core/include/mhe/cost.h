@@ -19,7 +19,8 @@
  *
  * Missing data: a missing sample is NaN in `y_ref`; a signal that has no value at a node (controls
  * at the last node) is NaN in `y`. A residual must let NaN through; the core then drops its row and
- * its Jacobian's. */
+ * its Jacobian's. A cost that has another residual for a missing target, one that does not need it,
+ * says so by layout->fills_missing. */
 #ifndef MHE_COST_H
 #define MHE_COST_H
 
@@ -70,6 +71,7 @@ typedef struct mhe_cost_layout {
     int32_t jacobian;       /* MHE_JACOBIAN_* */
     uint32_t scratch_bytes; /* wanted in stage->scratch */
     const char *res_unit;   /* unit of r, "1" if mixed */
+    int32_t fills_missing;  /* 1: r can be finite where y_ref is NaN */
 } mhe_cost_layout;
 
 /* One node as a cost sees it. All arrays are lent for the call. */

@@ -28,6 +28,7 @@ void mhi_estimator_set_start(mhe_estimator *estimator, const double *q, const do
 void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
 /* Instead of what the config says: realtime.deadline_ms, here in s, 0: none; data.marker_outlier,
  * m, 0: markers are wishes, and kept however far they are. */
+void mhi_estimator_set_node(mhe_estimator *estimator, int32_t node); /* output.node */
 void mhi_estimator_set_deadline(mhe_estimator *estimator, double seconds);
 void mhi_estimator_set_outlier(mhe_estimator *estimator, double distance);
 

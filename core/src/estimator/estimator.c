@@ -266,6 +266,10 @@ void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
     e->prepared = 0;
 }
 
+void mhi_estimator_set_node(mhe_estimator *e, int32_t node) {
+    e->node = node;
+}
+
 void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {
     e->budget = seconds;
 }

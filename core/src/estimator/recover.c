@@ -5,7 +5,7 @@
  * model expects it is left out of the solves. A frame most of whose markers are so is implausible.
  * LOST_FRAMES of them in a row are not the measurements' fault: the window has lost the motion. So
  * it has after a whole window of failed solves. It then begins again from what was measured, as the
- * first one did. */
+ * first one did. A window that has not settled yet believes all markers, but is given up, too. */
 #include "estimator/estimator_private.h"
 
 #include <string.h>
@@ -26,7 +26,7 @@ double mhi_rms_distance(const double *a, const double *b, int32_t n, int32_t per
 void mhi_recover_screen(mhe_estimator *e) {
     double *seen = mhi_row(e->trusted, e->n, 3 * e->n_k);
     int32_t n_seen = 0, n_off = 0;
-    if (!(e->outlier > 0) || !e->settled) {
+    if (!(e->outlier > 0)) {
         return;
     }
     for (int32_t i = 0; i < e->n_k; i++) {
@@ -34,7 +34,7 @@ void mhi_recover_screen(mhe_estimator *e) {
         const int32_t off = far > e->outlier + e->fit;
         n_seen += !isnan(far);
         n_off += off;
-        for (int32_t axis = 0; axis < 3 && off; axis++) {
+        for (int32_t axis = 0; axis < 3 && off && e->settled; axis++) {
             seen[3 * i + axis] = NAN;
         }
     }
@@ -60,7 +60,9 @@ void mhi_recover_begun(mhe_estimator *e) {
 void mhi_recover_solved(mhe_estimator *e, int32_t frame_status) {
     const int32_t failed = frame_status == MHE_FRAME_PREDICTED;
     e->predicted = !failed ? 0 : e->predicted + e->settled; /* to settle may take its time */
-    if (failed || !(e->outlier > 0)) {
+    const int32_t finished =
+        frame_status == MHE_FRAME_OK || frame_status == MHE_FRAME_ITERATION_LIMIT;
+    if (!finished || !(e->outlier > 0)) { /* what drifts must not raise its own limit */
         return;
     }
     if (mhi_system_markers(mhi_ocp_context(e->ocp), mhi_row(e->solution.x, e->n, e->n_x),

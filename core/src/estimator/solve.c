@@ -43,23 +43,29 @@ static void predict(mhe_estimator *e) {
     }
 }
 
-/* The solver looks at its clock between iterations: it is told to stop one iteration before the
- * time is over. How long one takes is learned, and forgotten again, so that one long one (the
- * machine was busy) does not stop all that follow. */
+#define LEARN 0.2 /* weight of the last solve in what an iteration is thought to take */
+
+/* When a solver, which looks at the clock between iterations, is to begin no more: one iteration
+ * before the time is over, but never before half of it, or a busy moment of the machine would stop
+ * all solves that follow. */
+static double latest_start(const mhe_estimator *e) {
+    return e->arrival + e->budget - fmin(e->per_iteration, 0.5 * e->budget);
+}
+
 static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
     const double begin = mhi_now();
-    const mhe_solve_control control = {.size = sizeof control,
-                                       .deadline = e->arrival + e->budget - e->per_iteration};
+    const mhe_solve_control control = {.size = sizeof control, .deadline = latest_start(e)};
     *info = (mhe_solve_info){.size = sizeof *info};
     mhe_status status =
         e->solver->solve(e->solver_self, e->budget > 0 ? &control : NULL, &e->solution, info, err);
-    const double each = info->iterations > 0 ? (mhi_now() - begin) / info->iterations : 0;
-    e->per_iteration = fmax(each, 0.7 * e->per_iteration);
+    if (info->iterations > 0) {
+        e->per_iteration += LEARN * ((mhi_now() - begin) / info->iterations - e->per_iteration);
+    }
     return status;
 }
 
 static int32_t out_of_time(const mhe_estimator *e) {
-    return e->budget > 0 && mhi_now() >= e->arrival + e->budget - e->per_iteration;
+    return e->budget > 0 && mhi_now() >= latest_start(e);
 }
 
 /* Largest change of a velocity or activation of the first state. */

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* live.h: the recording fed by the clock, as if it were measured now. */
+#ifndef LIVE_H
+#define LIVE_H
+
+#include "base/text.h"
+
+#include <mhe/estimator.h>
+#include <stdint.h>
+
+/* What came of it; times in s. Zeroed before. */
+typedef struct live {
+    double begin;    /* of the clock, when the first frame came */
+    double deadline; /* from a frame to its estimate */
+    int32_t next;    /* frame to wait for */
+    int32_t n_missed;
+    double arrived;  /* when the frame in work came */
+    double *latency; /* [n_latency] from a frame's coming to its estimate; of `memory` */
+    double *jitter;  /* [n_jitter] from a frame's coming to when it was taken up */
+    int32_t n_latency, n_jitter;
+    double *memory;
+} live;
+
+/* For at most n_frames. */
+mhe_status live_open(live *l, int32_t n_frames, mhe_error *err);
+void live_close(live *l);
+
+/* Prepares the estimator, waits for the next frame at time[k] [n]; the newest there is, -1 at the
+ * end. */
+int32_t live_wait(live *l, mhe_estimator *estimator, const double *time, int32_t n);
+/* The frame's estimate is there. */
+void live_estimated(live *l);
+/* Sorts the times. */
+void live_end(live *l);
+void live_lines(const live *l, double rate, mhi_text *out); /* after live_end */
+
+#endif
