@@ -22,6 +22,12 @@ mhe_status mhi_step_fail(const mhi_step_work *w, mhe_status code, mhe_error *err
 }
 
 static mhe_status create_problem(mhi_step_work *w, mhe_error *err) {
+    const mhi_bounds_section *b = &w->setup->run->bounds;
+    if (b->residual_torque_at.n > 0 || b->residual_torque_limits.n > 0) {
+        return mhi_step_fail(w, MHE_E_CONFIG, err,
+                             "residual_torque_at and residual_torque_limits are for mhe-run; a "
+                             "step's own bounds take {signal: residual_torque, of: [...]}");
+    }
     const mhi_step_setup *s = w->setup;
     mhi_term_setup *terms = MHI_TAKE(&w->arena, mhi_term_setup, w->step->n_costs);
     w->x = MHI_TAKE(&w->arena, double, w->face->n_x);
