@@ -42,6 +42,8 @@ mhi_node *mhi_node_find(const mhi_node *mapping, const char *key); /* NULL if ab
 int32_t mhi_node_count(const mhi_node *node);                      /* number of children */
 /* 1 for a key without a value, ~ and null (not in quotes). */
 int32_t mhi_node_is_null(const mhi_node *node);
+/* Appends the node on one line, without its key: YAML that reads back the same. */
+void mhi_node_write(const mhi_node *node, mhi_text *out);
 /* Turns a scalar `text` into the mapping {key: text}, and an absent value into an empty mapping;
  * MHE_E_MEMORY. Anything else stays as it is. */
 mhe_status mhi_node_expand(mhi_tree *tree, mhi_node *node, const char *key, mhe_error *err);

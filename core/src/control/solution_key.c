@@ -1,40 +1,36 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* solution_key.c: all that a step's solution depends on, as text. */
-#define _GNU_SOURCE /* dladdr */
 #include "base/digest.h"
 #include "config/options.h"
 #include "config/options_value.h"
 #include "control/solution_cache.h"
 #include "control/step_private.h"
 #include "io/slurp.h"
+#include "plugin/loader.h"
 
-#include <dlfcn.h>
 #include <inttypes.h>
 #include <mhe/version.h>
-#include <stdlib.h>
 #include <string.h>
 
 static mhe_status add_file(mhi_text *key, const char *path, mhe_error *err) {
-    char *bytes = NULL;
     size_t length = 0;
-    mhe_status status = mhi_slurp(path, &bytes, &length, err);
+    uint64_t digest = 0;
+    mhe_status status = mhi_file_digest(path, &length, &digest, err);
     if (status == MHE_OK) {
-        mhi_text_add(key, "# %s: %zu bytes, %016" PRIx64 "\n", path, length,
-                     mhi_digest(bytes, length));
+        mhi_text_add(key, "# %s: %zu bytes, %016" PRIx64 "\n", path, length, digest);
     }
-    free(bytes);
     return status;
 }
 
-/* The library a plugin lives in, where its texts are (the descriptor may be a copy): built anew it
- * is another. */
+/* A library that is built anew is another. */
 static mhe_status add_plugin(mhi_text *key, const mhe_plugin *plugin, mhe_error *err) {
-    Dl_info place;
-    if (dladdr(plugin->id, &place) == 0 || place.dli_fname == NULL) {
-        return mhe_fail(err, MHE_E_INPUT, "%s: its file is not known", plugin->id);
+    const char *library = NULL;
+    mhe_status status = mhi_plugin_library(plugin, &library, err);
+    if (status != MHE_OK) {
+        return status;
     }
     mhi_text_add(key, "# %s %s\n", plugin->id, plugin->version);
-    return add_file(key, place.dli_fname, err);
+    return add_file(key, library, err);
 }
 
 static mhe_status add_program(const mhi_run *run, mhi_text *key, mhe_error *err) {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "io/slurp.h"
 
+#include "base/digest.h"
+
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
@@ -49,5 +51,16 @@ mhe_status mhi_slurp(const char *path, char **text, size_t *length, mhe_error *e
         *text = NULL;
         *length = 0;
     }
+    return status;
+}
+
+mhe_status mhi_file_digest(const char *path, size_t *length, uint64_t *digest, mhe_error *err) {
+    char *bytes = NULL;
+    *digest = 0;
+    mhe_status status = mhi_slurp(path, &bytes, length, err);
+    if (status == MHE_OK) {
+        *digest = mhi_digest(bytes, *length);
+    }
+    free(bytes);
     return status;
 }

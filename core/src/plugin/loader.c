@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE /* dladdr */
 #include "plugin/loader.h"
 
 #include "plugin/check.h"
@@ -136,5 +137,14 @@ mhe_status mhi_loader_open(const char *path, mhi_arena *arena, const mhe_plugin 
     }
     *plugins = list;
     *n_plugins = n;
+    return MHE_OK;
+}
+
+mhe_status mhi_plugin_library(const mhe_plugin *plugin, const char **path, mhe_error *err) {
+    Dl_info place; /* of its texts: the descriptor may be a copy */
+    if (dladdr(plugin->id, &place) == 0 || place.dli_fname == NULL) {
+        return mhe_fail(err, MHE_E_INPUT, "%s: its file is not known", plugin->id);
+    }
+    *path = place.dli_fname;
     return MHE_OK;
 }

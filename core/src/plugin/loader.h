@@ -13,4 +13,8 @@
 mhe_status mhi_loader_open(const char *path, mhi_arena *arena, const mhe_plugin *const **plugins,
                            int32_t *n_plugins, mhe_error *err);
 
+/* The shared object that a plugin lives in, absolute; as long as it is loaded: until exit.
+ * MHE_E_INPUT: not known. */
+mhe_status mhi_plugin_library(const mhe_plugin *plugin, const char **path, mhe_error *err);
+
 #endif
