@@ -18,6 +18,9 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
 /* `run` and `host` must outlive it. [cold] */
 mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
                                 mhe_error *err);
+/* The same on a description that was read before, for many estimators on one model; it is lent. */
+mhe_status mhi_estimator_create_on(const mhi_run *run, const mhe_description *description,
+                                   const mhe_host *host, mhe_estimator **estimator, mhe_error *err);
 const mhi_system *mhi_estimator_system(const mhe_estimator *estimator);
 mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
 /* First state from outside the config (a reference), before the first push: q, qdot [n_q], NaN (or
@@ -31,5 +34,9 @@ void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
 void mhi_estimator_set_node(mhe_estimator *estimator, int32_t node); /* output.node */
 void mhi_estimator_set_deadline(mhe_estimator *estimator, double seconds);
 void mhi_estimator_set_outlier(mhe_estimator *estimator, double distance);
+/* After a push that was `ready`: node k of that window, 1 .. N, as an estimate: time, states,
+ * controls and what follows from them. The last node has the controls that lead to it. */
+mhe_status mhi_estimator_node(mhe_estimator *estimator, int32_t k, mhe_estimate *estimate,
+                              mhe_error *err);
 
 #endif

@@ -184,8 +184,9 @@ static mhe_status start_from_config(mhe_estimator *e, mhe_error *err) {
     return MHE_OK;
 }
 
-mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
-                                mhe_error *err) {
+/* On `description`, or where it is NULL on the one that the run names. */
+static mhe_status create_on(const mhi_run *run, const mhe_description *description,
+                            const mhe_host *host, mhe_estimator **estimator, mhe_error *err) {
     *estimator = NULL;
     mhe_estimator *e = calloc(1, sizeof *e);
     if (e == NULL) {
@@ -199,7 +200,11 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
     e->node = run->output.node;
     e->outlier = run->data.marker_outlier;
     e->budget = 1e-3 * run->realtime.deadline_ms;
-    mhe_status status = mhi_estimator_read_model(run, host, &e->description, err);
+    mhe_status status = MHE_OK;
+    if (description == NULL) {
+        status = mhi_estimator_read_model(run, host, &e->owned_description, err);
+    }
+    e->description = description == NULL ? e->owned_description : description;
     if (status == MHE_OK) {
         status = create_problem(e, err);
         status = status == MHE_OK ? MHE_OK : locate(run, status, err);
@@ -228,6 +233,17 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
     return MHE_OK;
 }
 
+mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_estimator **estimator,
+                                mhe_error *err) {
+    return create_on(run, NULL, host, estimator, err);
+}
+
+mhe_status mhi_estimator_create_on(const mhi_run *run, const mhe_description *description,
+                                   const mhe_host *host, mhe_estimator **estimator,
+                                   mhe_error *err) {
+    return create_on(run, description, host, estimator, err);
+}
+
 void mhe_estimator_close(mhe_estimator *e) {
     if (e == NULL) {
         return;
@@ -238,7 +254,7 @@ void mhe_estimator_close(mhe_estimator *e) {
     }
     mhi_ocp_free(e->ocp);
     mhi_system_free(e->system);
-    mhi_description_free(e->description);
+    mhi_description_free(e->owned_description);
     mhi_run_free(e->owned_run);
     mhi_registry_free(e->registry);
     mhi_arena_free(&e->arena);

@@ -16,7 +16,8 @@ struct mhe_estimator {
     mhi_registry *registry; /* NULL where the run was lent */
     mhi_run *owned_run;
     const mhi_run *run;
-    mhe_description *description;
+    mhe_description *owned_description; /* NULL where it was lent */
+    const mhe_description *description;
     mhi_system *system;
     mhi_ocp *ocp;
     const mhe_solver_ops *solver;

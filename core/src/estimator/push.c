@@ -23,9 +23,9 @@ static const double *delayed_emg(mhe_estimator *e, const double *emg) {
     return e->delay_line + get * e->n_m;
 }
 
-/* Everything that is told about the chosen node; the last one has the controls that lead to it. */
-static mhe_status give_estimate(mhe_estimator *e, mhe_estimate *out, mhe_error *err) {
-    const int32_t k = e->node, controls = k < e->n ? k : e->n - 1;
+/* Everything that is told about a node; the last one has the controls that lead to it. */
+static mhe_status give_estimate(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_error *err) {
+    const int32_t controls = k < e->n ? k : e->n - 1;
     const double *x = mhi_row(e->solution.x, k, e->n_x);
     const double *u = mhi_row(e->solution.u, controls, e->n_u);
     const int driven = e->n_x > 2 * e->n_q;
@@ -57,6 +57,11 @@ static mhe_status give_estimate(mhe_estimator *e, mhe_estimate *out, mhe_error *
     out->residual = e->out_residual;
     out->markers = e->out_marker;
     return status;
+}
+
+mhe_status mhi_estimator_node(mhe_estimator *e, int32_t k, mhe_estimate *estimate, mhe_error *err) {
+    *estimate = (mhe_estimate){.size = sizeof *estimate};
+    return give_estimate(e, k - 1, estimate, err); /* the window has moved on since */
 }
 
 mhe_status mhe_estimator_prepare(mhe_estimator *e, mhe_error *err) {
@@ -120,7 +125,7 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     if (status == MHE_OK) {
         mhi_window_solve(e, &info, &estimate->status);
         mhi_recover_solved(e, estimate->status);
-        status = give_estimate(e, estimate, err);
+        status = give_estimate(e, e->node, estimate, err);
         estimate->latency = mhi_now() - e->arrival;
         estimate->solve_time = estimate->latency + e->ahead;
     }

@@ -351,6 +351,15 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     return MHE_OK;
 }
 
+mhe_frame mhi_recording_frame(const mhi_recording *r, int32_t n_markers, int32_t n_muscles,
+                              int32_t k) {
+    return (mhe_frame){.size = sizeof(mhe_frame),
+                       .time = r->time[k],
+                       .markers =
+                           r->markers == NULL ? NULL : r->markers + (ptrdiff_t)k * 3 * n_markers,
+                       .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * n_muscles};
+}
+
 void mhi_recording_free(mhi_recording *r) {
     if (r == NULL) {
         return;

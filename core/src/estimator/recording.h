@@ -8,6 +8,7 @@
 #include "emg/electrodes.h"
 
 #include <mhe/description.h>
+#include <mhe/estimator.h>
 #include <mhe/host.h>
 
 /* What is known of the truth, on the frames' times. NaN where a column is absent. */
@@ -41,6 +42,9 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *model,
 mhe_status mhi_recording_read_reference(const char *path, const mhe_description *model,
                                         const mhe_host *host, mhi_recording **recording,
                                         mhe_error *err);
+/* Frame k, for a model of so many markers and muscles; the arrays are the recording's. */
+mhe_frame mhi_recording_frame(const mhi_recording *recording, int32_t n_markers, int32_t n_muscles,
+                              int32_t k);
 void mhi_recording_free(mhi_recording *recording);
 
 #endif

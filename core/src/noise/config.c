@@ -101,8 +101,15 @@ static const mhi_node *section_node(const mhi_tree *tree, const char *name) {
     return node;
 }
 
-static mhe_status read_section(mhi_noise_config *config, const mhi_section *s, mhe_error *err) {
-    mhi_run *run = config->run;
+/* Where a file's sections are read from and to. */
+typedef struct noise_source {
+    const mhi_tree *tree;
+    const char *dir;
+    mhi_arena *arena;
+} noise_source;
+
+static mhe_status read_section(const noise_source *source, mhi_noise_config *config,
+                               const mhi_section *s, mhe_error *err) {
     const char *others[N_SECTIONS + 1]; /* keys of this mapping that are sections */
     int32_t n = 0;
     for (int32_t i = 0; i < N_SECTIONS; i++) {
@@ -114,30 +121,52 @@ static mhe_status read_section(mhi_noise_config *config, const mhi_section *s, m
     if (*s->name == '\0') {
         others[n++] = "model";
     }
-    return mhi_options_fill(s->options, s->n_options, run->tree, section_node(run->tree, s->name),
-                            others, n, *s->name == '\0' ? NULL : s->name, run->dir, &run->arena,
+    return mhi_options_fill(s->options, s->n_options, source->tree,
+                            section_node(source->tree, s->name), others, n,
+                            *s->name == '\0' ? NULL : s->name, source->dir, source->arena,
                             (unsigned char *)config + s->offset, err);
+}
+
+static void set_places(mhi_noise *noise, const mhi_tree *tree) {
+    noise->tree = tree;
+    noise->markers.node = section_node(tree, "noise.markers");
+    noise->emg.node = section_node(tree, "noise.emg");
 }
 
 mhe_status mhi_noise_config_read(const char *path, const char *const *set, int32_t n_set,
                                  mhi_registry *registry, mhi_noise_config *config, mhe_error *err) {
     *config = (mhi_noise_config){0};
     mhe_status status = mhi_run_read_model(path, set, n_set, registry, &config->run, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    mhi_run *run = config->run;
+    const noise_source source = {run->tree, run->dir, &run->arena};
     for (int32_t i = 0; i < N_SECTIONS && status == MHE_OK; i++) {
-        status = read_section(config, &sections[i], err);
+        status = read_section(&source, config, &sections[i], err);
     }
     if (status == MHE_OK && config->output.levels.n > MHI_NOISE_LEVELS_MAX) {
-        status = mhi_fail_at(err, MHE_E_CONFIG, config->run->tree,
-                             section_node(config->run->tree, "output"),
+        status = mhi_fail_at(err, MHE_E_CONFIG, run->tree, section_node(run->tree, "output"),
                              "output: 'levels' has %d values; %d can be shown",
                              config->output.levels.n, MHI_NOISE_LEVELS_MAX);
     }
-    if (status == MHE_OK) {
-        mhi_noise *noise = &config->noise;
-        noise->tree = config->run->tree;
-        noise->markers.node = section_node(noise->tree, "noise.markers");
-        noise->emg.node = section_node(noise->tree, "noise.emg");
+    set_places(&config->noise, run->tree);
+    return status;
+}
+
+mhe_status mhi_noise_read(const mhi_tree *tree, mhi_arena *arena, mhi_noise *noise,
+                          mhe_error *err) {
+    static const char name[] = "noise";
+    const noise_source source = {tree, NULL, arena};
+    mhi_noise_config config = {0};
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < N_SECTIONS && status == MHE_OK; i++) {
+        if (strncmp(sections[i].name, name, sizeof name - 1) == 0) {
+            status = read_section(&source, &config, &sections[i], err);
+        }
     }
+    *noise = config.noise;
+    set_places(noise, tree);
     return status;
 }
 

@@ -11,6 +11,7 @@
 #ifndef MHI_NOISE_CONFIG_H
 #define MHI_NOISE_CONFIG_H
 
+#include "base/arena.h"
 #include "noise/noise.h"
 
 #define MHI_NOISE_LEVELS_MAX 4
@@ -33,6 +34,10 @@ typedef struct mhi_noise_config {
 mhe_status mhi_noise_config_read(const char *path, const char *const *set, int32_t n_set,
                                  mhi_registry *registry, mhi_noise_config *config, mhe_error *err);
 void mhi_noise_config_free(mhi_noise_config *config);
+
+/* The section `noise` of another program's file, all defaults where there is none. Texts live in
+ * `arena`; the tree must outlive the noise. MHE_E_CONFIG. [cold] */
+mhe_status mhi_noise_read(const mhi_tree *tree, mhi_arena *arena, mhi_noise *noise, mhe_error *err);
 
 /* Every key with its value: YAML that reads back the same. */
 void mhi_noise_config_write(const mhi_noise_config *config, mhi_text *out);

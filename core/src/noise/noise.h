@@ -117,6 +117,14 @@ mhe_status mhi_noise_markers(const mhi_noise *noise, const mhi_recording *refere
 mhe_status mhi_noise_emg(const mhi_noise *noise, const mhi_recording *reference,
                          const mhe_description *description, mhi_record *out, mhe_error *err);
 
+/* Both records as the estimator takes a recording: on the markers' times, with the truth there (EMG
+ * and reference as mhi_recording_read takes them from files). Give it back with mhi_recording_free.
+ * Statuses as above. [cold] */
+mhe_status mhi_noise_recording(const mhi_noise *noise, const mhi_recording *reference,
+                               const mhe_description *description, const mhe_plugin *model,
+                               const void *model_config, const mhe_host *host,
+                               mhi_recording **recording, mhe_error *err);
+
 /* The noise of `level` on one muscle's signal [n], n > 32, `stride` apart, in place. [any] */
 void mhi_noise_harmonics(double *signal, int32_t n, int32_t stride, double level, int32_t seed,
                          int32_t muscle);
