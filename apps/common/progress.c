@@ -3,34 +3,59 @@
 
 #include "measure.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <unistd.h>
 
 #define BAR 30
 
-void progress_start(progress *p, int32_t total, int quiet) {
-    *p = (progress){
-        .enabled = !quiet && isatty(STDERR_FILENO), .total = total, .begin = measure_seconds()};
+void progress_start(progress *p, int32_t total, int32_t before, int quiet) {
+    *p = (progress){.enabled = !quiet && isatty(STDERR_FILENO),
+                    .total = total,
+                    .before = before,
+                    .begin = measure_seconds()};
 }
 
-void progress_update(progress *p, int32_t done, int32_t solves, int32_t converged) {
-    const double time = measure_seconds();
-    if (!p->enabled || (time - p->drawn < 0.1 && done < p->total) || done == 0) {
+double progress_elapsed(const progress *p) {
+    return measure_seconds() - p->begin;
+}
+
+int32_t progress_due(const progress *p, int32_t done) {
+    return p->enabled && done > p->before &&
+           (measure_seconds() - p->drawn >= 0.1 || done == p->total);
+}
+
+/* "45 s", "12 min", "3 h 05 min" */
+static void write_time(double seconds, char *out, size_t size) {
+    const int minutes = (int)(seconds / 60 + 0.5);
+    if (seconds < 100) {
+        (void)snprintf(out, size, "%.0f s", seconds);
+    } else if (minutes < 100) {
+        (void)snprintf(out, size, "%d min", minutes);
+    } else {
+        (void)snprintf(out, size, "%d h %02d min", minutes / 60, minutes % 60);
+    }
+}
+
+void progress_update(progress *p, int32_t done, const char *format, ...) {
+    if (!progress_due(p, done)) {
         return;
     }
-    p->drawn = time;
+    p->drawn = measure_seconds();
     p->shown = 1;
-    const double elapsed = time - p->begin;
-    const double left = elapsed * (p->total - done) / done;
+    char bar[BAR + 1], left[32], words[160];
     const int filled = (int)((int64_t)BAR * done / p->total);
-    char bar[BAR + 1];
     for (int i = 0; i < BAR; i++) {
         bar[i] = i < filled ? '#' : '.';
     }
     bar[BAR] = '\0';
-    (void)fprintf(stderr, "\r[%s] %3d %%  %.0f s left  %.1f solves/s  %.1f %% converged ", bar,
-                  (int)(100.0 * done / p->total), left, elapsed > 0 ? solves / elapsed : 0.0,
-                  solves == 0 ? 100.0 : 100.0 * converged / solves);
+    write_time(progress_elapsed(p) * (p->total - done) / (done - p->before), left, sizeof left);
+    va_list args;
+    va_start(args, format);
+    (void)vsnprintf(words, sizeof words, format, args);
+    va_end(args);
+    (void)fprintf(stderr, "\r\033[K[%s] %3d %%  %s left  %s ", bar, (int)(100.0 * done / p->total),
+                  left, words);
     (void)fflush(stderr);
 }
 

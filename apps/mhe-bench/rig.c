@@ -5,15 +5,6 @@
 
 #include <string.h>
 
-static mhe_frame frame_of(const rig *r, int32_t k) {
-    const mhi_recording *d = r->recording;
-    return (mhe_frame){
-        .size = sizeof(mhe_frame),
-        .time = d->time[k],
-        .markers = d->markers == NULL ? NULL : d->markers + (ptrdiff_t)k * 3 * r->info.n_markers,
-        .emg = d->emg == NULL ? NULL : d->emg + (ptrdiff_t)k * r->info.n_muscles};
-}
-
 static void start(const rig *r, mhe_estimator *estimator) {
     if (r->recording->reference.present) {
         mhi_estimator_set_start(estimator, r->recording->reference.q, r->recording->reference.qdot);
@@ -57,7 +48,8 @@ static mhe_status first_run(rig *r, mhe_error *err) {
     }
     start(r, r->estimator);
     for (int32_t k = 0; k < r->n_frames && status == MHE_OK; k++) {
-        const mhe_frame frame = frame_of(r, k);
+        const mhe_frame frame =
+            mhi_recording_frame(r->recording, r->info.n_markers, r->info.n_muscles, k);
         mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
         status = mhe_estimator_push(r->estimator, &frame, &estimate, &ready, err);
@@ -118,7 +110,8 @@ mhe_status rig_run(const rig *r, double *frame_seconds, int32_t *n, mhe_error *e
     }
     start(r, estimator);
     for (int32_t k = 0; k < r->n_frames && status == MHE_OK; k++) {
-        const mhe_frame frame = frame_of(r, k);
+        const mhe_frame frame =
+            mhi_recording_frame(r->recording, r->info.n_markers, r->info.n_muscles, k);
         mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
         const double begin = measure_seconds();

@@ -6,52 +6,11 @@
 #include <cJSON.h>
 #include <math.h>
 #include <mhe/version.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
-
-mhe_status summary_add(summary *s, const mhe_estimate *estimate, mhe_error *err) {
-    if (s->n_solves == s->capacity) {
-        const int32_t capacity = s->capacity == 0 ? 1024 : 2 * s->capacity;
-        double *grown = realloc(s->solve_ms, sizeof(double) * (size_t)capacity);
-        if (grown == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-        s->solve_ms = grown;
-        s->capacity = capacity;
-    }
-    s->solve_ms[s->n_solves++] = 1e3 * estimate->solve_time;
-    s->n_converged += estimate->status == MHE_FRAME_OK;
-    s->n_deadline += estimate->status == MHE_FRAME_DEADLINE;
-    s->n_predicted += estimate->status == MHE_FRAME_PREDICTED;
-    s->iterations_sum += estimate->iterations;
-    if (estimate->iterations > s->iterations_max) {
-        s->iterations_max = estimate->iterations;
-    }
-    return MHE_OK;
-}
-
-void summary_free(summary *s) {
-    free(s->solve_ms);
-}
 
 /* Of the sorted solve times, ms. */
 static double percentile(const summary *s, double fraction) {
-    return measure_percentile(s->solve_ms, s->n_solves, fraction);
-}
-
-static double mean_ms(const summary *s) {
-    double sum = 0;
-    for (int32_t i = 0; i < s->n_solves; i++) {
-        sum += s->solve_ms[i];
-    }
-    return s->n_solves == 0 ? NAN : sum / s->n_solves;
-}
-
-static double peak_rss_mb(void) {
-    struct rusage usage;
-    getrusage(RUSAGE_SELF, &usage);
-    return (double)usage.ru_maxrss / 1024;
+    return measure_percentile(s->tally.solve_ms, s->tally.n_solves, fraction);
 }
 
 /* cJSON writes NaN as null, which is what "not known" is in JSON. */
@@ -72,9 +31,9 @@ static void add_rmse(cJSON *root, const mhi_rmse *rmse) {
 
 static void add_times(cJSON *root, const summary *s) {
     cJSON *rate = cJSON_AddObjectToObject(root, "rate_hz");
-    add_number(rate, "mean", 1e3 / mean_ms(s));
+    add_number(rate, "mean", 1e3 / tally_mean_ms(&s->tally));
     cJSON *ms = cJSON_AddObjectToObject(root, "solve_ms");
-    add_number(ms, "mean", mean_ms(s));
+    add_number(ms, "mean", tally_mean_ms(&s->tally));
     add_number(ms, "p50", percentile(s, 0.5));
     add_number(ms, "p95", percentile(s, 0.95));
     add_number(ms, "p99", percentile(s, 0.99));
@@ -107,14 +66,14 @@ static void add_realtime(cJSON *root, const summary *s) {
     const live *l = s->live;
     cJSON *o = cJSON_AddObjectToObject(root, "realtime");
     add_number(o, "deadline_ms", 1e3 * l->deadline);
-    add_number(o, "rate_hz", s->n_solves / s->elapsed);
+    add_number(o, "rate_hz", s->tally.n_solves / s->elapsed);
     add_number(o, "missed_frames", l->n_missed);
     add_spread(o, "latency_ms", l->latency, l->n_latency);
     add_spread(o, "jitter_ms", l->jitter, l->n_jitter);
 }
 
 mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
-    measure_sort(s->solve_ms, s->n_solves);
+    tally_sort(&s->tally);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "version", MHE_VERSION);
     cJSON_AddStringToObject(root, "config", config);
@@ -128,14 +87,14 @@ mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error
     add_number(root, "ratio", s->info.ratio);
     cJSON_AddStringToObject(root, "solver", s->info.solver);
     add_number(root, "frames", s->n_pushed);
-    add_number(root, "solves", s->n_solves);
-    add_number(root, "converged", s->n_solves == 0 ? NAN : (double)s->n_converged / s->n_solves);
+    add_number(root, "solves", s->tally.n_solves);
+    add_number(root, "converged", tally_converged(&s->tally));
     add_times(root, s);
     cJSON *iterations = cJSON_AddObjectToObject(root, "iterations");
-    add_number(iterations, "mean", s->n_solves == 0 ? NAN : s->iterations_sum / s->n_solves);
-    add_number(iterations, "max", s->iterations_max);
-    add_number(root, "deadline_misses", s->n_deadline);
-    add_number(root, "peak_rss_mb", peak_rss_mb());
+    add_number(iterations, "mean", tally_iterations(&s->tally));
+    add_number(iterations, "max", s->tally.iterations_max);
+    add_number(root, "deadline_misses", s->tally.n_deadline);
+    add_number(root, "peak_rss_mb", tally_peak_rss_mb());
     add_number(root, "node", s->info.node);
     add_number(root, "delay_s", s->info.delay);
     if (s->live != NULL) {
@@ -161,14 +120,15 @@ void summary_lines(const summary *s, mhi_text *out) {
     if (s->emg.n_channels > 0) {
         mhi_text_add(out, "%s\n", s->alignment);
     }
-    mhi_text_add(out, "%d frames, %d solves, %.2f %% converged\n", s->n_pushed, s->n_solves,
-                 s->n_solves == 0 ? 0.0 : 100.0 * s->n_converged / s->n_solves);
-    if (s->n_solves > 0) {
+    mhi_text_add(out, "%d frames, %d solves, %.2f %% converged\n", s->n_pushed, s->tally.n_solves,
+                 s->tally.n_solves == 0 ? 0.0 : 100.0 * s->tally.n_converged / s->tally.n_solves);
+    if (s->tally.n_solves > 0) {
         mhi_text_add(out, "rate %.1f Hz mean; solve %.2f ms median, %.2f ms p99, %.2f ms max\n",
-                     1e3 / mean_ms(s), percentile(s, 0.5), percentile(s, 0.99), percentile(s, 1));
+                     1e3 / tally_mean_ms(&s->tally), percentile(s, 0.5), percentile(s, 0.99),
+                     percentile(s, 1));
     }
     if (s->live != NULL) {
-        live_lines(s->live, s->n_solves / s->elapsed, out);
+        live_lines(s->live, s->tally.n_solves / s->elapsed, out);
     }
     const struct {
         const char *what, *unit;

@@ -3,7 +3,6 @@
 
 #include "diagnosis.h"
 #include "estimator/create.h"
-#include "measure.h"
 #include "picture.h"
 #include "progress.h"
 #include "report.h"
@@ -84,7 +83,7 @@ static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_e
     mhe_status status = results_write(t->results, estimate, diagnosis_distances(t->diagnosis),
                                       diagnosis_emg(t->diagnosis), err);
     if (status == MHE_OK) {
-        status = summary_add(&t->summary, estimate, err);
+        status = tally_add(&t->summary.tally, estimate, err);
     }
     if (status == MHE_OK && t->errors != NULL) {
         status = mhi_errors_add(t->errors, estimate, err);
@@ -95,11 +94,7 @@ static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_e
 static mhe_status estimate_frame(tracking *t, int32_t k, mhe_error *err) {
     const mhi_recording *r = t->recording;
     const mhe_estimator_info *info = &t->summary.info;
-    const mhe_frame frame = {
-        .size = sizeof frame,
-        .time = r->time[k],
-        .markers = r->markers == NULL ? NULL : r->markers + (ptrdiff_t)k * 3 * info->n_markers,
-        .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * info->n_muscles};
+    const mhe_frame frame = mhi_recording_frame(r, info->n_markers, info->n_muscles, k);
     mhe_estimate estimate = {.size = sizeof estimate};
     int32_t ready = 0;
     mhe_status status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
@@ -113,19 +108,26 @@ static mhe_status estimate_frame(tracking *t, int32_t k, mhe_error *err) {
     return status;
 }
 
+static void show(progress *bar, int32_t done, const tally *t) {
+    const double elapsed = progress_elapsed(bar);
+    progress_update(bar, done, "%.1f solves/s  %.1f %% converged",
+                    elapsed > 0 ? t->n_solves / elapsed : 0.0,
+                    t->n_solves == 0 ? 100.0 : 100 * tally_converged(t));
+}
+
 static mhe_status estimate_all(tracking *t, mhe_error *err) {
     const int32_t n = t->recording->n_frames;
     progress bar;
-    progress_start(&bar, n, t->setup->quiet);
+    progress_start(&bar, n, 0, t->setup->quiet);
     mhe_status status = MHE_OK;
     for (int32_t k = 0; k < n && status == MHE_OK && !interrupted; k++) {
         if (t->setup->realtime) {
             k = live_wait(&t->live, t->estimator, t->recording->time, n);
         }
         status = interrupted ? MHE_OK : estimate_frame(t, k, err);
-        progress_update(&bar, k + 1, t->summary.n_solves, t->summary.n_converged);
+        show(&bar, k + 1, &t->summary.tally);
     }
-    t->summary.elapsed = measure_seconds() - bar.begin;
+    t->summary.elapsed = progress_elapsed(&bar);
     progress_end(&bar);
     live_end(&t->live);
     mhe_estimator_describe(t->estimator, &t->summary.info);
@@ -183,7 +185,7 @@ static void tell(const tracking *t) {
 }
 
 static mhe_status finish(tracking *t, mhe_error *err) {
-    if (t->summary.n_solves == 0) {
+    if (t->summary.tally.n_solves == 0) {
         return mhe_fail(err, MHE_E_INTERRUPTED,
                         "interrupted before the first estimate; nothing is written");
     }
@@ -195,8 +197,8 @@ static mhe_status finish(tracking *t, mhe_error *err) {
         return status;
     }
     draw(t);
-    if (t->summary.n_converged == 0 && t->summary.n_predicted < t->summary.n_solves &&
-        !t->setup->realtime) {
+    if (t->summary.tally.n_converged == 0 &&
+        t->summary.tally.n_predicted < t->summary.tally.n_solves && !t->setup->realtime) {
         t->setup->host->log(t->setup->host, MHE_LOG_WARNING,
                             "no solve converged; quality.sto says how each ended");
     }
@@ -207,7 +209,7 @@ static mhe_status finish(tracking *t, mhe_error *err) {
             "interrupted after %d of %d frames; the files hold what was estimated until then",
             t->summary.n_pushed, t->summary.n_frames);
     }
-    if (t->summary.n_predicted == t->summary.n_solves) {
+    if (t->summary.tally.n_predicted == t->summary.tally.n_solves) {
         return mhe_fail(err, MHE_E_NUMERIC,
                         "every solve failed; the files hold the model's predictions, quality.sto "
                         "says how each ended");
@@ -238,7 +240,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     diagnosis_free(t.diagnosis);
     mhi_recording_free(t.recording);
     mhe_estimator_close(t.estimator);
-    summary_free(&t.summary);
+    tally_free(&t.summary.tally);
     live_close(&t.live);
     return status;
 }
