@@ -270,6 +270,35 @@ static void unreadable_files(void **state) {
     assert_null(tree);
 }
 
+/* What is written reads back as the same: kinds, texts, what is in quotes. */
+static void nodes_are_written(void **state) {
+    (void)state;
+    static const char text[] = "{a: [1, -2.5e3, .inf], b: {c: \"7\", 'd e': '1, 2', f: [], g: {}}, "
+                               "h: 'it''s #1', i: null, j: yes, k: '', l: x..y}\n";
+    mhi_tree *tree = parse(text);
+    mhi_text once = {0}, twice = {0};
+    mhi_node_write(mhi_tree_root(tree), &once);
+    mhi_tree *again = parse(once.data);
+    mhi_node_write(mhi_tree_root(again), &twice);
+    assert_string_equal(once.data, twice.data);
+    const mhi_node *c = at(again, "b", "c"), *d = at(again, "b", "d e");
+    assert_string_equal(c->text, "7");
+    assert_true(c->quoted);
+    assert_string_equal(d->text, "1, 2");
+    assert_string_equal(at(again, "h", NULL)->text, "it's #1");
+    assert_true(mhi_node_is_null(at(again, "i", NULL)));
+    assert_false(mhi_node_is_null(at(again, "k", NULL)));
+    assert_false(at(again, "j", NULL)->quoted);
+    assert_int_equal(mhi_node_count(at(again, "a", NULL)), 3);
+    assert_string_equal(at(again, "a", NULL)->first->next->text, "-2.5e3");
+    assert_int_equal(at(again, "b", "f")->kind, MHI_SEQUENCE);
+    assert_int_equal(at(again, "b", "g")->kind, MHI_MAPPING);
+    mhi_text_free(&once);
+    mhi_text_free(&twice);
+    mhi_tree_free(tree);
+    mhi_tree_free(again);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(nodes_know_lines),      cmocka_unit_test(empty_file_is_empty_mapping),
@@ -277,6 +306,7 @@ int main(void) {
         cmocka_unit_test(wrong_yaml_is_refused), cmocka_unit_test(endless_trees_are_refused),
         cmocka_unit_test(set_replaces_and_adds), cmocka_unit_test(wrong_set_is_refused),
         cmocka_unit_test(messages_point),        cmocka_unit_test(unreadable_files),
+        cmocka_unit_test(nodes_are_written),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

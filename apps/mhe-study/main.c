@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe-study: many estimates under many conditions, and what they come to. */
+#include "arguments.h"
+#include "console.h"
+#include "run.h"
+#include "study.h"
+
+#include <mhe/version.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char help[] =
+    "Runs an estimator on simulated recordings under many conditions, many times.\n"
+    "\n"
+    "  mhe-study run STUDY.yaml [--out DIR] [--workers N] [--set path.to.key=value]... [--quiet]\n"
+    "  mhe-study run --check STUDY.yaml [--set path.to.key=value]...\n"
+    "  mhe-study merge DIR [DIR]... \n"
+    "  mhe-study --version | --help\n"
+    "\n"
+    "run: every trial of the study that DIR (default ./out/<study's name>) has no result of; a "
+    "run\n"
+    "that was ended in any way goes on where it was. At the end results.csv (one line a trial, "
+    "the\n"
+    "same to the byte on any number of workers), timing.csv. --shard 0/8 ... 7/8 does one of "
+    "eight\n"
+    "parts, in a process or on a machine of its own.\n"
+    "merge: the tables of what DIR has, with the rows of other folders of the same study.\n"
+    "'mhe-study run --help' shows every key of a study file.\n"
+    "Exit status: 0 done; 1 failed, interrupted or incomplete; 2 the command line or an input is\n"
+    "wrong.\n";
+
+static mhe_status help_run(mhe_error *err) {
+    mhi_text text = {0};
+    study_describe(&text);
+    (void)fputs("mhe-study run STUDY.yaml [--out DIR] [--workers N] [--shard I/N] [--check]\n"
+                "    [--set path.to.key=value]... [--quiet]\n\nKeys of the study:\n\n",
+                stdout);
+    return console_print(&text, err);
+}
+
+static mhe_status help_all(mhe_error *err) {
+    (void)err;
+    (void)fputs(help, stdout);
+    return MHE_OK;
+}
+
+static const struct command {
+    const char *name;
+    int32_t takes; /* ARGUMENTS_* */
+    mhe_status (*run)(const arguments *a, const mhe_host *host, mhe_error *err);
+    mhe_status (*help)(mhe_error *err);
+} commands[] = {{"run", ARGUMENTS_RUN, run_study, help_run},
+                {"merge", ARGUMENTS_FOLDER, run_merge, help_all}};
+#define N_COMMANDS ((int32_t)(sizeof commands / sizeof commands[0]))
+
+static mhe_status run_command(const struct command *command, int argc, char **argv,
+                              mhe_error *err) {
+    const mhe_host host = console_host("mhe-study");
+    arguments a;
+    mhe_status status = arguments_parse(argc, argv, command->takes, &a, err);
+    if (status == MHE_OK) {
+        status = a.help ? command->help(err) : command->run(&a, &host, err);
+    }
+    arguments_free(&a);
+    return status;
+}
+
+static mhe_status unknown_command(const char *word, mhe_error *err) {
+    const char *names[N_COMMANDS];
+    char hint[256];
+    for (int32_t i = 0; i < N_COMMANDS; i++) {
+        names[i] = commands[i].name;
+    }
+    (void)mhi_suggest(hint, sizeof hint, word == NULL ? "" : word, names, N_COMMANDS);
+    return word == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "no command is given%s", hint)
+                        : mhe_fail(err, MHE_E_ARGUMENT, "unknown command '%s'%s", word, hint);
+}
+
+int main(int argc, char **argv) {
+    mhe_error err = {0};
+    const char *word = argc >= 2 ? argv[1] : NULL;
+    mhe_status status = MHE_OK;
+    const struct command *command = NULL;
+    /* Workers are processes: threads of a library below would only stand in each other's way. */
+    (void)setenv("OMP_NUM_THREADS", "1", 0);
+    (void)setenv("OPENBLAS_NUM_THREADS", "1", 0);
+    for (int32_t i = 0; i < N_COMMANDS && word != NULL; i++) {
+        command = strcmp(word, commands[i].name) == 0 ? &commands[i] : command;
+    }
+    if (command != NULL) {
+        status = run_command(command, argc, argv, &err);
+    } else if (word != NULL && strcmp(word, "--version") == 0) {
+        (void)printf("mhe-study %s\n", MHE_VERSION);
+    } else if (word != NULL && (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0)) {
+        (void)fputs(help, stdout);
+    } else {
+        status = unknown_command(word, &err);
+    }
+    if (status == MHE_OK && fflush(stdout) != 0) {
+        status = mhe_fail(&err, MHE_E_IO, "the output could not be written");
+    }
+    if (status != MHE_OK) {
+        (void)fprintf(stderr, "mhe-study: %s\n", err.text);
+    }
+    return console_exit_status(status);
+}
