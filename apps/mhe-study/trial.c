@@ -78,7 +78,8 @@ static mhe_status estimate_all(tracking *t, mhe_error *err) {
         status = mhe_fail(err, MHE_E_INPUT, "%d frames are too few for a window of %d intervals",
                           (int)r->n_frames, (int)t->info.window);
     }
-    return status == MHE_OK && counts->n_solves == 1 ? take_window(t, err) : status;
+    return status == MHE_OK && counts->n_solves == 1 && t->info.node == 0 ? take_window(t, err)
+                                                                          : status;
 }
 
 /* dir/forces/<condition>-<trial>.sto */
