@@ -18,12 +18,13 @@
  *
  * An estimate comes whatever happens, marked by its status. Frames may be missing, NaN, or wrong:
  * a frame that is late by less than a window leaves nodes without measurements; markers far from
- * where they are expected are left out (`data.marker_outlier`); after more than a window without a
- * frame, or when the clock was set back by more than a window, the window fills anew as at the
- * start. Where three frames in a row do not fit what was expected, or a whole window of solves
- * failed, the window begins again from its measurements (MHE_FRAME_RESTARTED). With
- * `realtime.deadline_ms` every solve ends in time with what it has; the long first solve of a
- * window that begins is then spread over the frames that follow.
+ * where they are expected are left out (`data.marker_outlier`), and so is EMG most of which stays
+ * at the ends of its range (`data.emg_saturation`); after more than a window without a frame, or
+ * when the clock was set back by more than a window, the window fills anew as at the start. Where
+ * three frames in a row do not fit what was expected, or a whole window of solves failed, the
+ * window begins again from its measurements (MHE_FRAME_RESTARTED). With `realtime.deadline_ms`
+ * every solve ends in time with what it has; the long first solve of a window that begins is then
+ * spread over the frames that follow.
  *
  * Threads: one estimator belongs to one thread at a time; several estimators are independent. */
 #ifndef MHE_ESTIMATOR_H

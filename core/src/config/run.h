@@ -32,9 +32,10 @@ typedef struct mhi_model_section {
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
     double emg_offset;                     /* s, added to the EMG file's times */
-    int32_t emg_delay;     /* frames by which the tracked EMG lags: activation-driven default 2,
-                            * excitation-driven and with electrodes 0 (-1 in the file = by default) */
-    double marker_outlier; /* m; 0: none */
+    int32_t emg_delay;      /* frames by which the tracked EMG lags: activation-driven default 2,
+                             * excitation-driven and with electrodes 0 (-1 in the file = by default) */
+    double marker_outlier;  /* m; 0: none */
+    int32_t emg_saturation; /* frames; 0: any EMG is believed */
 } mhi_data_section;
 
 #define MHI_EMG_LOW_PASS 0

@@ -47,6 +47,9 @@ static const mhe_option data_options[] = {
     MHE_OPT_REAL(mhi_data_section, marker_outlier, 0.2, 0, DBL_MAX, "m",
                  "A marker that is further from where the model expects it, beside how far markers "
                  "are anyway, is left out; 0: none."),
+    MHE_OPT_INT(mhi_data_section, emg_saturation, 3, 0, 1000, "samples",
+                "After so many frames in a row with the whole EMG at its rails (every channel 0 or "
+                "at least 1, or most at least 1), these samples are missing; 0: never."),
 };
 
 static const mhe_option emg_options[] = {

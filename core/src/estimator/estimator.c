@@ -199,6 +199,7 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
     e->delay = run->data.emg_delay;
     e->node = run->output.node;
     e->outlier = run->data.marker_outlier;
+    e->saturation = run->data.emg_saturation;
     e->budget = 1e-3 * run->realtime.deadline_ms;
     mhe_status status = MHE_OK;
     if (description == NULL) {

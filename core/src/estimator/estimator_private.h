@@ -59,6 +59,8 @@ struct mhe_estimator {
     double outlier;      /* m; 0: everything is believed */
     double fit;          /* m, RMS marker distance of the newest node solved */
     double *expected;    /* [3 n_k] markers of the newest node before it is measured */
+    int32_t saturation;  /* frames; 0: any EMG is believed */
+    int32_t railed;      /* frames in a row whose EMG is at its rails */
     int32_t implausible; /* frames in a row most of whose markers are not where expected */
     int32_t predicted;   /* failed solves in a row */
 
@@ -120,6 +122,9 @@ void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_sta
 
 /* recover.c */
 void mhi_recover_screen(mhe_estimator *e); /* the newest frame against what is expected */
+/* Counts a frame's EMG [n_m], used or not, and takes out of the window what is at the rails. */
+void mhi_recover_count_emg(mhe_estimator *e, const double *emg);
+void mhi_recover_drop_emg(mhe_estimator *e);
 int32_t mhi_recover_is_lost(const mhe_estimator *e);
 void mhi_recover_begun(mhe_estimator *e); /* the window begins again: believe what was measured */
 void mhi_recover_solved(mhe_estimator *e, int32_t frame_status);

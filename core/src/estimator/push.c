@@ -109,10 +109,12 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     }
     const double *emg = delayed_emg(e, frame->emg == NULL ? e->no_emg : frame->emg);
     e->n_frames++;
+    mhi_recover_count_emg(e, emg);
     if (!used) {
         return MHE_OK;
     }
     mhi_window_append(e, frame->time, frame->markers == NULL ? e->no_markers : frame->markers, emg);
+    mhi_recover_drop_emg(e);
     if (e->filled <= e->n) {
         return MHE_OK;
     }

@@ -5,12 +5,20 @@
  * model expects it is left out of the solves. A frame most of whose markers are so is implausible.
  * LOST_FRAMES of them in a row are not the measurements' fault: the window has lost the motion. So
  * it has after a whole window of failed solves. It then begins again from what was measured, as the
- * first one did. A window that has not settled yet believes all markers, but is given up, too. */
+ * first one did. A window that has not settled yet believes all markers, but is given up, too.
+ *
+ * An amplifier that saturates or fails sets many channels at once to the ends of their range and
+ * keeps them there. Muscles do not, so such EMG is no measurement, after `data.emg_saturation`
+ * frames of it (those before are taken out of the window then). One muscle at its largest, or some
+ * at rest, are plausible: a channel alone is always believed. Believed rails do not only spoil the
+ * windows that hold them: the activations that they lead to decay with the muscles' own time
+ * constant, which is longer than a short window. */
 #include "estimator/estimator_private.h"
 
 #include <string.h>
 
 #define LOST_FRAMES 3
+#define FEW_CHANNELS 3 /* fewer than these may be at their ends by chance */
 
 double mhi_rms_distance(const double *a, const double *b, int32_t n, int32_t per_point) {
     double squares = 0;
@@ -40,6 +48,40 @@ void mhi_recover_screen(mhe_estimator *e) {
     }
     if (n_seen > 0) {
         e->implausible = 2 * n_off > n_seen ? e->implausible + 1 : 0;
+    }
+}
+
+static int32_t is_rail(double emg) {
+    return emg >= 1 || emg == 0;
+}
+
+static int32_t at_rails(const mhe_estimator *e, const double *emg) {
+    int32_t n_measured = 0, n_low = 0, n_high = 0;
+    for (int32_t i = 0; i < e->n_m; i++) {
+        n_measured += !isnan(emg[i]);
+        n_low += emg[i] == 0;
+        n_high += emg[i] >= 1;
+    }
+    return n_measured >= FEW_CHANNELS && (n_low + n_high == n_measured || 2 * n_high > n_measured);
+}
+
+void mhi_recover_count_emg(mhe_estimator *e, const double *emg) {
+    const int32_t railed = e->saturation > 0 && at_rails(e, emg);
+    e->railed = !railed ? 0 : e->railed < e->saturation ? e->railed + 1 : e->railed;
+}
+
+void mhi_recover_drop_emg(mhe_estimator *e) {
+    if (e->railed == 0 || e->railed < e->saturation) {
+        return;
+    }
+    for (int32_t k = e->filled; k-- > 0;) { /* what was dropped before is no longer at the rails */
+        double *emg = mhi_row(e->emg, k, e->n_m);
+        if (!at_rails(e, emg)) {
+            return;
+        }
+        for (int32_t i = 0; i < e->n_m; i++) {
+            emg[i] = is_rail(emg[i]) ? NAN : emg[i];
+        }
     }
 }
 

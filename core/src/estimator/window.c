@@ -28,7 +28,7 @@ void mhi_window_clear(mhe_estimator *e) {
     e->filled = e->n_counted = 0;
     e->interval = 0;
     e->begun = e->settled = e->prepared = 0;
-    e->implausible = e->predicted = 0;
+    e->implausible = e->predicted = e->railed = 0;
     mhi_estimator_forget_start(e);
 }
 
