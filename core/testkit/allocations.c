@@ -6,6 +6,7 @@
 
 #include <errno.h>
 #include <mhe/abi.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 
 /* glibc's own entry points; what they return goes to the ordinary free(). */
@@ -15,33 +16,43 @@ extern void *__libc_realloc(void *old, size_t size);  /* NOLINT */
 extern void *__libc_memalign(size_t at, size_t size); /* NOLINT */
 
 static _Thread_local uint64_t count;
+static atomic_uint_fast64_t count_of_all;
 
 uint64_t mhi_allocations(void) {
     return count;
 }
 
-MHE_EXPORT void *malloc(size_t size) {
+uint64_t mhi_allocations_of_all(void) {
+    return atomic_load(&count_of_all);
+}
+
+static void add(void) {
     count++;
+    atomic_fetch_add(&count_of_all, 1);
+}
+
+MHE_EXPORT void *malloc(size_t size) {
+    add();
     return __libc_malloc(size);
 }
 
 MHE_EXPORT void *calloc(size_t n, size_t size) {
-    count++;
+    add();
     return __libc_calloc(n, size);
 }
 
 MHE_EXPORT void *realloc(void *old, size_t size) {
-    count++;
+    add();
     return __libc_realloc(old, size);
 }
 
 MHE_EXPORT void *aligned_alloc(size_t alignment, size_t size) {
-    count++;
+    add();
     return __libc_memalign(alignment, size);
 }
 
 MHE_EXPORT int posix_memalign(void **out, size_t alignment, size_t size) {
-    count++;
+    add();
     *out = __libc_memalign(alignment, size);
     return *out != NULL ? 0 : ENOMEM;
 }
