@@ -163,7 +163,7 @@ int32_t nlp_read_bounds(nlp *p) {
         }
         int32_t number = lower == upper ? -1 : n;
         renumber |= !first && p->number[i] != number;
-        changed |= number >= 0 && (p->lower[i] != lower || p->upper[i] != upper);
+        changed |= !first && number >= 0 && (p->lower[i] != lower || p->upper[i] != upper);
         p->lower[i] = lower;
         p->upper[i] = upper;
         p->number[i] = number;

@@ -12,6 +12,7 @@
 
 static char alignment[512];
 static int n_warnings;
+static char data[512]; /* the recording's folder */
 
 static void listen(const mhe_host *host, int32_t level, const char *text) {
     (void)host;
@@ -46,10 +47,7 @@ static double mean_of(const mhi_recording *r, const mhe_description *d, const ch
 static void emg_follows_the_arm(void **state) {
     (void)state;
     static const mhe_host host = {.size = sizeof host, .log = listen, .service = no_service};
-    char data[512], folder[] = "/tmp/mhe-abduction-XXXXXX", command[1500], config[64], link[64];
-    if (test_data_path(data, sizeof data, "abduction") == NULL) {
-        skip();
-    }
+    char folder[] = "/tmp/mhe-abduction-XXXXXX", command[1500], config[64], link[64];
     assert_non_null(mkdtemp(folder));
     (void)snprintf(link, sizeof link, "%s/abduction", folder);
     (void)snprintf(config, sizeof config, "%s/abduction.yaml", folder);
@@ -103,6 +101,10 @@ static void emg_follows_the_arm(void **state) {
 }
 
 int main(void) {
+    if (test_data_path(data, sizeof data, "abduction") == NULL) {
+        (void)puts("the recording is absent: skipped");
+        return TEST_SKIPPED;
+    }
     const struct CMUnitTest tests[] = {cmocka_unit_test(emg_follows_the_arm)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
