@@ -165,18 +165,35 @@ mhe_status material_make(const study *s, const char *dir, int quiet, mhe_error *
 
 /* ---- reading ---- */
 
+static int32_t same_texts(const char *const *a, int32_t n_a, const char *const *b, int32_t n_b) {
+    for (int32_t i = 0; i < n_a && i < n_b; i++) {
+        if (strcmp(a[i], b[i]) != 0) {
+            return 0;
+        }
+    }
+    return n_a == n_b;
+}
+
+/* The same file, read in the same way. */
+static int32_t same_model(const mhi_model_section *a, const mhi_model_section *b) {
+    const mhe_text_map *at_a = &a->locked_at, *at_b = &b->locked_at;
+    return strcmp(a->file, b->file) == 0 && a->unsupported == b->unsupported &&
+           same_texts(a->locked.values, a->locked.n, b->locked.values, b->locked.n) &&
+           same_texts(at_a->keys, at_a->n, at_b->keys, at_b->n) &&
+           same_texts(at_a->values, at_a->n, at_b->values, at_b->n);
+}
+
 static mhe_status find_model(material *m, const mhi_run *run, const mhe_host *host,
                              material_model **found, mhe_error *err) {
     const mhi_model_section *section = &run->model_file;
     for (int32_t i = 0; i < m->n_models; i++) {
-        if (strcmp(m->models[i].file, section->file) == 0 &&
-            m->models[i].unsupported == section->unsupported) {
+        if (same_model(m->models[i].section, section)) {
             *found = &m->models[i];
             return MHE_OK;
         }
     }
     *found = &m->models[m->n_models++];
-    **found = (material_model){.file = section->file, .unsupported = section->unsupported};
+    **found = (material_model){.section = section};
     return mhi_estimator_read_model(run, host, &(*found)->description, err);
 }
 

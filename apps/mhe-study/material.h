@@ -6,8 +6,7 @@
 #include "study.h"
 
 typedef struct material_model {
-    const char *file;
-    int32_t unsupported;
+    const mhi_model_section *section;
     mhe_description *description;
 } material_model;
 

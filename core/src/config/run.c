@@ -285,7 +285,10 @@ static mhe_status read_plugin_section(const struct reader *r, const mhi_section 
     mhi_use *use = (mhi_use *)(void *)((unsigned char *)run + s->offset);
     mhe_status status = read_use(r, s, section_node(run, s->name), use, &own);
     if (use == &run->model) {
-        run->model_file = (mhi_model_section){.file = own.file, .unsupported = own.unsupported};
+        run->model_file = (mhi_model_section){.file = own.file,
+                                              .unsupported = own.unsupported,
+                                              .locked = own.locked,
+                                              .locked_at = own.locked_at};
     }
     return status;
 }

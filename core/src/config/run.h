@@ -26,7 +26,9 @@ typedef struct mhi_use {
  * absolute or NULL. */
 typedef struct mhi_model_section {
     const char *file;
-    int32_t unsupported; /* MHI_UNSUPPORTED_* */
+    int32_t unsupported;    /* MHI_UNSUPPORTED_* */
+    mhe_text_list locked;   /* coordinates that stay at the file's value */
+    mhe_text_map locked_at; /* coordinates that stay at this value, rad or m */
 } mhi_model_section;
 
 typedef struct mhi_data_section {

@@ -25,6 +25,11 @@ static const mhe_option model_options[] = {
     MHE_OPT_PATH(mhi_use_section, file, MHE_OPT_REQUIRED, "Model file, .osim or .bioMod."),
     MHE_OPT_ENUM(mhi_use_section, unsupported, "stop", "stop|warn",
                  "What to do when the model file holds something that cannot be represented."),
+    MHE_OPT_TEXTS(mhi_use_section, locked, 0,
+                  "Coordinates that do not move: they stay at the file's value and are no part of "
+                  "the estimate."),
+    MHE_OPT_MAP(mhi_use_section, locked_at, 0,
+                "Coordinates that stay at a value of their own, {NAME: rad or m}."),
 };
 
 static const mhe_option muscle_options[] = {

@@ -14,8 +14,10 @@ typedef struct mhi_top_section {
 /* The core's own keys of all sections that name a plugin; each section's table has some of them. */
 typedef struct mhi_use_section {
     const char *plugin;
-    const char *file;     /* model */
-    int32_t unsupported;  /* model */
+    const char *file;            /* model */
+    int32_t unsupported;         /* model */
+    mhe_text_list locked;        /* model */
+    mhe_text_map locked_at;      /* model */
     double weight, sigma, huber; /* costs */
 } mhi_use_section;
 

@@ -12,6 +12,8 @@ static void write_use(const mhi_run *run, const mhi_section *section, const mhi_
     const mhi_use_section own = {.plugin = use->plugin->id,
                                  .file = run->model_file.file,
                                  .unsupported = run->model_file.unsupported,
+                                 .locked = run->model_file.locked,
+                                 .locked_at = run->model_file.locked_at,
                                  .weight = use->weight,
                                  .sigma = use->sigma,
                                  .huber = use->huber};

@@ -27,7 +27,7 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
                         "%s (%d such element%s; 'model.unsupported: warn' goes on without)",
                         d->unsupported[0], d->n_unsupported, d->n_unsupported == 1 ? "" : "s");
     }
-    return MHE_OK;
+    return mhi_estimator_lock(run, *description, err);
 }
 
 /* A plugin's refusal to be created begins with its id, that of a cost with "costs.<position>: ":

@@ -129,6 +129,9 @@ int32_t mhi_recover_is_lost(const mhe_estimator *e);
 void mhi_recover_begun(mhe_estimator *e); /* the window begins again: believe what was measured */
 void mhi_recover_solved(mhe_estimator *e, int32_t frame_status);
 
+/* locked.c: takes what the model section locks out of a description just read. */
+mhe_status mhi_estimator_lock(const mhi_run *run, mhe_description *description, mhe_error *err);
+
 /* Distance of two sets of n numbers, of which per_point make a point; NaN entries do not count. */
 double mhi_rms_distance(const double *a, const double *b, int32_t n, int32_t per_point);
 

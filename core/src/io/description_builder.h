@@ -11,6 +11,12 @@
 
 #include <mhe/description.h>
 
+/* What mhi_build_finish hands over. */
+typedef struct mhi_owned_description {
+    mhe_description description; /* first: its address is the address of the whole */
+    mhi_arena arena;
+} mhi_owned_description;
+
 /* Pointers to things that live in the builder's arena; {0} is empty. */
 typedef struct mhi_list {
     void **items;

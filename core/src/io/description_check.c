@@ -9,14 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-typedef struct owned_description {
-    mhe_description description; /* first: its address is the address of the whole */
-    mhi_arena arena;
-} owned_description;
-
 void mhi_description_free(mhe_description *description) {
     if (description != NULL) {
-        owned_description *owned = (owned_description *)(void *)description;
+        mhi_owned_description *owned = (mhi_owned_description *)(void *)description;
         mhi_arena_free(&owned->arena);
         free(owned);
     }
@@ -351,7 +346,7 @@ static const char *base_name(mhi_builder *b) {
 
 mhe_status mhi_build_finish(mhi_builder *b, mhe_description **description) {
     *description = NULL;
-    owned_description *owned = calloc(1, sizeof *owned);
+    mhi_owned_description *owned = calloc(1, sizeof *owned);
     int32_t *place = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
     int32_t *mirrored = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
     if (b->status == MHE_OK && (owned == NULL || place == NULL || mirrored == NULL)) {

@@ -11,7 +11,11 @@
  * "file:line: what is wrong". [cold] */
 mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_error *err);
 
-/* The same from memory, for fuzzing and tests; `name` is used in messages. */
+/* Makes a finished description's coordinates i with a finite at[i] [n_coordinates] constants at
+ * that value, as locked ones of the file are; the rest keep their order. MHE_E_MEMORY. [cold] */
+mhe_status mhi_description_lock(mhe_description *description, const double *at, mhe_error *err);
+
+/* mhi_model_read from memory, for fuzzing and tests; `name` is used in messages. */
 mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
                           mhe_description **description, mhe_error *err);
 mhe_status mhi_biomod_parse(const char *name, const char *text, size_t length,
