@@ -3,9 +3,11 @@
 
 #include "base/arena.h"
 #include "estimator/create.h"
+#include "io/c3d_write.h"
 #include "io/model_file.h"
 #include "io/sink.h"
 
+#include <math.h>
 #include <sys/stat.h>
 
 typedef struct recorder {
@@ -13,7 +15,7 @@ typedef struct recorder {
     const mhe_host *host;
     mhe_description *model;
     mhi_recording *reference;
-    mhi_record markers, emg;
+    mhi_record markers, emg, raw_emg; /* the last one may be none */
     mhi_outbox *outbox;
     mhi_arena arena;
 } recorder;
@@ -28,8 +30,12 @@ static mhe_status record(recorder *r, mhe_error *err) {
         status = mhi_noise_markers(&c->noise, r->reference, r->model, c->run->model.plugin,
                                    c->run->model.config, r->host, &r->markers, err);
     }
-    return status == MHE_OK ? mhi_noise_emg(&c->noise, r->reference, r->model, &r->emg, err)
-                            : status;
+    if (status == MHE_OK) {
+        status = mhi_noise_emg(&c->noise, r->reference, r->model, &r->emg, err);
+    }
+    return status == MHE_OK && c->noise.raw_emg.electrodes.n > 0
+               ? mhi_noise_raw_emg(&c->noise, r->reference, r->model, &r->raw_emg, err)
+               : status;
 }
 
 static mhe_status write_rows(const mhi_record *record, mhi_sink *sink, mhe_error *err) {
@@ -41,15 +47,24 @@ static mhe_status write_rows(const mhi_record *record, mhi_sink *sink, mhe_error
     return status;
 }
 
+static const char **marker_names(recorder *r, mhe_error *err) {
+    const mhe_description *d = r->model;
+    const char **names = MHI_TAKE(&r->arena, const char *, d->n_markers);
+    for (int32_t i = 0; names != NULL && i < d->n_markers; i++) {
+        names[i] = d->markers[i].name;
+    }
+    if (names == NULL) {
+        (void)mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    return names;
+}
+
 static mhe_status write_markers(recorder *r, mhe_error *err) {
     const mhe_description *d = r->model;
     mhi_sink *sink = NULL;
-    const char **names = MHI_TAKE(&r->arena, const char *, d->n_markers);
+    const char **names = marker_names(r, err);
     if (names == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    for (int32_t i = 0; i < d->n_markers; i++) {
-        names[i] = d->markers[i].name;
+        return MHE_E_MEMORY;
     }
     mhe_status status = mhi_sink_trc(r->outbox, "markers.trc", names, d->n_markers, r->markers.rate,
                                      1e-3, "mm", &sink, err);
@@ -69,6 +84,33 @@ static mhe_status write_emg(recorder *r, mhe_error *err) {
     mhe_status status =
         mhi_sink_sto(r->outbox, "emg.sto", "EMG, normalised", names, d->n_muscles, &sink, err);
     return status == MHE_OK ? write_rows(&r->emg, sink, err) : status;
+}
+
+/* Markers and raw EMG; the frames that both last for. */
+static mhe_status write_recording(recorder *r, mhe_error *err) {
+    const mhi_record *markers = &r->markers, *emg = &r->raw_emg;
+    const double per_frame = round(emg->rate / markers->rate);
+    if (fabs(emg->rate / markers->rate - per_frame) > 1e-6 || per_frame < 1) {
+        return mhe_fail(err, MHE_E_CONFIG,
+                        "noise: raw_emg.rate (%g Hz) must be a multiple of the markers' rate (%g "
+                        "Hz)",
+                        emg->rate, markers->rate);
+    }
+    const int32_t n_emg = emg->n_samples / (int32_t)per_frame;
+    const mhi_c3d_content content = {.markers = marker_names(r, err),
+                                     .channels = r->config->noise.raw_emg.electrodes.keys,
+                                     .unit = "V",
+                                     .n_markers = r->model->n_markers,
+                                     .n_channels = emg->n_channels,
+                                     .n_frames =
+                                         markers->n_samples < n_emg ? markers->n_samples : n_emg,
+                                     .per_frame = (int32_t)per_frame,
+                                     .rate = markers->rate,
+                                     .first = markers->time[0],
+                                     .points = markers->values,
+                                     .analog = emg->values};
+    return content.markers == NULL ? MHE_E_MEMORY
+                                   : mhi_outbox_c3d(r->outbox, "recording.c3d", &content, err);
 }
 
 static mhe_status write_config(recorder *r, mhe_error *err) {
@@ -120,6 +162,9 @@ mhe_status noise_record(const mhi_noise_config *config, const mhe_host *host, co
     if (status == MHE_OK) {
         status = write_emg(&r, err);
     }
+    if (status == MHE_OK && r.raw_emg.n_channels > 0) {
+        status = write_recording(&r, err);
+    }
     if (status == MHE_OK) {
         status = write_config(&r, err);
     }
@@ -132,6 +177,7 @@ mhe_status noise_record(const mhi_noise_config *config, const mhe_host *host, co
     mhi_outbox_close(r.outbox);
     mhi_record_free(&r.markers);
     mhi_record_free(&r.emg);
+    mhi_record_free(&r.raw_emg);
     mhi_recording_free(r.reference);
     mhi_description_free(r.model);
     mhi_arena_free(&r.arena);

@@ -5,8 +5,9 @@
 
 #include "noise/config.h"
 
-/* Writes markers.trc, emg.sto, noise.yaml and, where the config wants it and gnuplot is installed,
- * noise.svg with its noise.gp into the folder; on a failure none of them. */
+/* Writes markers.trc, emg.sto, noise.yaml, with raw EMG recording.c3d and, where the config wants
+ * it and gnuplot is installed, noise.svg with its noise.gp into the folder; on a failure none of
+ * them. */
 mhe_status noise_record(const mhi_noise_config *config, const mhe_host *host, const char *out,
                         mhe_error *err);
 

@@ -75,6 +75,9 @@ static const char everything[] = "model: {file: arm.osim, unsupported: warn}\n"
                                  "    {level: 1.5, gain_sd: 0.1, crosstalk: {BRA: BRD 0.2},\n"
                                  "     failures: {BRD: 1..2}, failed_electrode: zero, rate: 1000,\n"
                                  "     latency: -0.02, clock_error: 1e-3}\n"
+                                 "  raw_emg:\n"
+                                 "    {electrodes: {Biceps: 'BRA 0.5, BRD 0.25'}, mvc: [3e-4],\n"
+                                 "     band_low: 30, band_high: 400, amplifier_sd: 2e-6}\n"
                                  "output: {picture: false, levels: [1, 2]}\n";
 
 static void written_reads_back_the_same(void **state) {
@@ -90,6 +93,9 @@ static void written_reads_back_the_same(void **state) {
     assert_int_equal(config.noise.emg.failed_electrode, MHI_FAILED_ZERO);
     assert_true(config.noise.markers.clock.clock_error == -1e-4);
     assert_true(config.noise.emg.clock.latency == -0.02);
+    assert_string_equal(config.noise.raw_emg.electrodes.values[0], "BRA 0.5, BRD 0.25");
+    assert_true(config.noise.raw_emg.clock.rate == 2000);
+    assert_true(config.noise.raw_emg.mvc.values[0] == 3e-4);
     mhi_noise_config_write(&config, &first);
     mhi_noise_config_free(&config);
     write_file(first.data);
@@ -143,9 +149,10 @@ static void refused(void **state) {
 
 static void every_key_is_described(void **state) {
     (void)state;
-    static const char *const keys[] = {"reference",   "seed",      "sd",       "white_sd",
-                                       "drift_sd",    "gaps",      "latency",  "level",
-                                       "clock_error", "crosstalk", "failures", "levels"};
+    static const char *const keys[] = {"reference",   "seed",      "sd",          "white_sd",
+                                       "drift_sd",    "gaps",      "latency",     "level",
+                                       "clock_error", "crosstalk", "failures",    "levels",
+                                       "electrodes",  "band_low",  "amplifier_sd"};
     mhi_text text = {0};
     mhi_noise_config_describe(&text);
     assert_non_null(text.data);

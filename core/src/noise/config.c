@@ -7,16 +7,16 @@
 #include <string.h>
 
 /* rate, latency and clock_error of a section with a mhi_clock. */
-#define CLOCK_OPTION(T, field, low, high, unit_, help_)                         \
-    {                                                                           \
-        .key = #field, .help = help_, .unit = unit_, .min = low, .max = high,   \
-        .type = MHE_TYPE_REAL, .offset = MHE_OPT_OFFSET(T, clock.field, double) \
+#define CLOCK_OPTION(T, field, dflt, low, high, unit_, help_)                                \
+    {                                                                                        \
+        .key = #field, .help = help_, .unit = unit_, .real_default = dflt, .min = low,       \
+        .max = high, .type = MHE_TYPE_REAL, .offset = MHE_OPT_OFFSET(T, clock.field, double) \
     }
-#define CLOCK_OPTIONS(T)                                                                    \
-    CLOCK_OPTION(T, rate, 0, 1e5, "Hz", "Samples a second; 0: the reference's own times."), \
-        CLOCK_OPTION(T, latency, -10, 10, "s",                                              \
-                     "A sample shows what was this long before its time."),                 \
-        CLOCK_OPTION(T, clock_error, -0.1, 0.1, "1",                                        \
+#define CLOCK_OPTIONS(T, rate_)                                                                    \
+    CLOCK_OPTION(T, rate, rate_, 0, 1e5, "Hz", "Samples a second; 0: the reference's own times."), \
+        CLOCK_OPTION(T, latency, 0, -10, 10, "s",                                                  \
+                     "A sample shows what was this long before its time."),                        \
+        CLOCK_OPTION(T, clock_error, 0, -0.1, 0.1, "1",                                            \
                      "Fraction by which the instrument's clock is slow.")
 
 static const mhe_option top_options[] = {
@@ -41,7 +41,7 @@ static const mhe_option marker_options[] = {
     MHE_OPT_MAP(mhi_marker_noise, gaps, 0, "Marker: when it is not seen, '1..1.5, 2..2.2' in s."),
     MHE_OPT_MAP(mhi_marker_noise, segment_gaps, 0,
                 "Segment: when all its markers are not seen, '1..1.5' in s."),
-    CLOCK_OPTIONS(mhi_marker_noise),
+    CLOCK_OPTIONS(mhi_marker_noise, 0),
 };
 
 static const mhe_option emg_options[] = {
@@ -55,7 +55,22 @@ static const mhe_option emg_options[] = {
                 "Muscle: when its electrode is off, '1..1.5, 2..2.2' in s."),
     MHE_OPT_ENUM(mhi_emg_noise, failed_electrode, "missing", "missing|zero",
                  "What is recorded while an electrode is off."),
-    CLOCK_OPTIONS(mhi_emg_noise),
+    CLOCK_OPTIONS(mhi_emg_noise, 0),
+};
+
+static const mhe_option raw_emg_options[] = {
+    MHE_OPT_MAP(mhi_raw_emg, electrodes, 0,
+                "Electrode: the muscles that it reads, 'BicepsLong 0.5, BicepsShort 0.5'; none: no "
+                "raw EMG."),
+    MHE_OPT_REALS(mhi_raw_emg, mvc, 0, 1e-9, 1, "V",
+                  "Mean rectified signal at an excitation of 1: one of all electrodes or one each; "
+                  "none: 0.001."),
+    MHE_OPT_REAL(mhi_raw_emg, band_low, 20, 0.001, 1e5, "Hz", "Lower corner of the signal's band."),
+    MHE_OPT_REAL(mhi_raw_emg, band_high, 450, 0.001, 1e5, "Hz",
+                 "Upper corner of the signal's band."),
+    MHE_OPT_REAL(mhi_raw_emg, amplifier_sd, 0, 0, 1, "V",
+                 "Spread of white noise that is there without a contraction too."),
+    CLOCK_OPTIONS(mhi_raw_emg, 2000),
 };
 
 static const mhe_option output_options[] = {
@@ -75,6 +90,10 @@ static const mhi_section sections[] = {
     SECTION("noise", "What the instruments add.", noise_options, AT(noise)),
     SECTION("noise.markers", "Errors of the markers.", marker_options, AT(noise.markers)),
     SECTION("noise.emg", "Errors of the EMG.", emg_options, AT(noise.emg)),
+    SECTION(
+        "noise.raw_emg",
+        "Raw EMG of electrodes, in recording.c3d with the markers; nothing of noise.emg is in it.",
+        raw_emg_options, AT(noise.raw_emg)),
     SECTION("output", "What is made of the results.", output_options, AT(output)),
 };
 #define N_SECTIONS ((int32_t)(sizeof sections / sizeof sections[0]))
@@ -131,6 +150,7 @@ static void set_places(mhi_noise *noise, const mhi_tree *tree) {
     noise->tree = tree;
     noise->markers.node = section_node(tree, "noise.markers");
     noise->emg.node = section_node(tree, "noise.emg");
+    noise->raw_emg.node = section_node(tree, "noise.raw_emg");
 }
 
 mhe_status mhi_noise_config_read(const char *path, const char *const *set, int32_t n_set,

@@ -40,8 +40,8 @@ void mhi_noise_harmonics(double *signal, int32_t n, int32_t stride, double level
     }
 }
 
-static mhe_status check_reference(const mhi_recording *r, const mhe_description *d,
-                                  mhe_error *err) {
+mhe_status mhi_noise_check_excitations(const mhi_recording *r, const mhe_description *d,
+                                       mhe_error *err) {
     for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * d->n_muscles; i++) {
         if (!isfinite(r->reference.excitation[i])) {
             return mhe_fail(err, MHE_E_INPUT, "the reference has no excitation of '%s' at %g s",
@@ -91,6 +91,14 @@ static mhe_status add_level(const mhi_noise *noise, mhi_record *out, mhe_error *
     return MHE_OK;
 }
 
+const char **mhi_muscle_names(const mhe_description *d, mhi_arena *arena) {
+    const char **names = MHI_TAKE(arena, const char *, d->n_muscles);
+    for (int32_t i = 0; names != NULL && i < d->n_muscles; i++) {
+        names[i] = d->muscles[i].name;
+    }
+    return names;
+}
+
 /* The parts of the options that name muscles. */
 typedef struct electrodes {
     double *crosstalk; /* [n_m x n_m] */
@@ -101,19 +109,16 @@ typedef struct electrodes {
 static mhe_status read_names(const mhi_noise *noise, const mhe_description *d, mhi_arena *arena,
                              electrodes *out, mhe_error *err) {
     const int32_t n_m = d->n_muscles, n_pairs = n_m * n_m;
-    const char **names = MHI_TAKE(arena, const char *, n_m);
+    const char **names = mhi_muscle_names(d, arena);
     out->crosstalk = MHI_TAKE(arena, double, n_pairs);
     if (names == NULL || out->crosstalk == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    for (int32_t i = 0; i < n_m; i++) {
-        names[i] = d->muscles[i].name;
-    }
     const mhi_subjects subjects = {"muscle", names, n_m};
     const mhi_map_place crosstalk = {noise->tree, noise->emg.node, "crosstalk"};
     const mhi_map_place failures = {noise->tree, noise->emg.node, "failures"};
-    mhe_status status =
-        mhi_fractions_read(&noise->emg.crosstalk, &crosstalk, &subjects, out->crosstalk, err);
+    mhe_status status = mhi_fractions_read(&noise->emg.crosstalk, &crosstalk, &subjects, &subjects,
+                                           out->crosstalk, err);
     return status == MHE_OK ? mhi_spans_read(&noise->emg.failures, &failures, &subjects, arena,
                                              &out->failures, &out->n_failures, err)
                             : status;
@@ -124,7 +129,7 @@ mhe_status mhi_noise_emg(const mhi_noise *noise, const mhi_recording *reference,
     mhi_arena arena = {0};
     electrodes parts = {0};
     *out = (mhi_record){0};
-    mhe_status status = check_reference(reference, d, err);
+    mhe_status status = mhi_noise_check_excitations(reference, d, err);
     if (status == MHE_OK) {
         status = read_names(noise, d, &arena, &parts, err);
     }

@@ -144,13 +144,14 @@ static int32_t read_fraction(mhi_cell part, mhi_cell *name, double *fraction) {
 }
 
 mhe_status mhi_fractions_read(const mhe_text_map *map, const mhi_map_place *place,
-                              const mhi_subjects *subjects, double *matrix, mhe_error *err) {
+                              const mhi_subjects *readers, const mhi_subjects *sources,
+                              double *matrix, mhe_error *err) {
     const mhi_c_locale locale = mhi_c_locale_begin();
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < map->n && status == MHE_OK; i++) {
         int32_t reader = -1, source = -1;
         const char *list = map->values[i], *key = map->keys[i];
-        status = subject_of(place, key, subjects, (mhi_cell){key, strlen(key)}, &reader, err);
+        status = subject_of(place, key, readers, (mhi_cell){key, strlen(key)}, &reader, err);
         mhi_cell part, name;
         while (status == MHE_OK && next_part(&list, &part)) {
             double fraction = 0;
@@ -158,12 +159,12 @@ mhe_status mhi_fractions_read(const mhe_text_map *map, const mhi_map_place *plac
                 status = refuse(place, key, err,
                                 "'%.60s' of '%s' is no list of %ss and fractions in [0, 1], like "
                                 "'%s 0.2'",
-                                map->values[i], key, subjects->what, subjects->names[0]);
+                                map->values[i], key, sources->what, sources->names[0]);
                 break;
             }
-            status = subject_of(place, key, subjects, name, &source, err);
+            status = subject_of(place, key, sources, name, &source, err);
             if (status == MHE_OK) {
-                matrix[(ptrdiff_t)reader * subjects->n + source] += fraction;
+                matrix[(ptrdiff_t)reader * sources->n + source] += fraction;
             }
         }
     }

@@ -50,6 +50,14 @@
  * fundamental; a trial of one cycle gets far more noise. failures, failed_electrode {muscle: spans
  * in s}: in them the electrode is off: samples are missing (NaN) or zero, as failed_electrode says.
  *
+ * Raw EMG, apart from that: modulated noise. Electrode j reads x_j = sum of fraction_i e_i over its
+ * muscles, as `electrodes` says {electrode: "BicepsLong 0.5, BicepsShort 0.5"}; sample k is
+ *     mvc_j sqrt(pi / 2) x_j(t_k) n_k + N(0, amplifier_sd)     (V)
+ * with n Gaussian noise of variance 1 in the band (white noise through a Butterworth band-pass of
+ * eight poles, run in), so that the rectified signal has the mean mvc_j where x_j is 1 and the
+ * amplifier is silent. [2] Hogan & Mann 1980, IEEE Trans. Biomed. Eng. 27(7), 382: EMG as such
+ * noise.
+ *
  * Threads: nothing here has state; calls on different outputs may run at the same time. Results
  * depend on the seed, the options and the reference alone. */
 #ifndef MHI_NOISE_H
@@ -87,10 +95,19 @@ typedef struct mhi_emg_noise {
     const mhi_node *node;
 } mhi_emg_noise;
 
+typedef struct mhi_raw_emg {
+    mhi_clock clock;
+    mhe_text_map electrodes;
+    mhe_real_list mvc; /* V: none: 1 mV; one of all electrodes; or one an electrode */
+    double band_low, band_high, amplifier_sd;
+    const mhi_node *node;
+} mhi_raw_emg;
+
 typedef struct mhi_noise {
     int32_t seed;
     mhi_marker_noise markers;
     mhi_emg_noise emg;
+    mhi_raw_emg raw_emg;
     const mhi_tree *tree; /* for messages; NULL */
 } mhi_noise;
 
@@ -119,11 +136,19 @@ mhe_status mhi_noise_emg(const mhi_noise *noise, const mhi_recording *reference,
 
 /* Both records as the estimator takes a recording: on the markers' times, with the truth there (EMG
  * and reference as mhi_recording_read takes them from files). Give it back with mhi_recording_free.
- * Statuses as above. [cold] */
+ * Statuses as above; MHE_E_CONFIG also: raw EMG is asked for. [cold] */
 mhe_status mhi_noise_recording(const mhi_noise *noise, const mhi_recording *reference,
                                const mhe_description *description, const mhe_plugin *model,
                                const void *model_config, const mhe_host *host,
                                mhi_recording **recording, mhe_error *err);
+
+/* Raw EMG (V; a channel an electrode, in the order of `electrodes`) of the reference's excitations.
+ * MHE_E_CONFIG also: no electrodes, mvc of another number, a band that the rate does not hold.
+ * [cold] */
+mhe_status mhi_noise_raw_emg(const mhi_noise *noise, const mhi_recording *reference,
+                             const mhe_description *description, mhi_record *out, mhe_error *err);
+/* V: mean of the rectified signal at an excitation of 1. [any] */
+double mhi_noise_mvc(const mhi_raw_emg *raw, int32_t electrode);
 
 /* The noise of `level` on one muscle's signal [n], n > 32, `stride` apart, in place. [any] */
 void mhi_noise_harmonics(double *signal, int32_t n, int32_t stride, double level, int32_t seed,

@@ -8,11 +8,13 @@
 #include "noise/random.h"
 
 /* Kinds of streams; a number, once given, is never used for something else. */
-#define MHI_STREAM_OFFSET 1   /* channel: marker, index: axis */
-#define MHI_STREAM_WHITE 2    /* channel: marker, index: 3 sample + axis */
-#define MHI_STREAM_DRIFT 3    /* as WHITE */
-#define MHI_STREAM_HARMONIC 4 /* channel: muscle, index: harmonic */
-#define MHI_STREAM_GAIN 5     /* channel: muscle, index: 0 */
+#define MHI_STREAM_OFFSET 1    /* channel: marker, index: axis */
+#define MHI_STREAM_WHITE 2     /* channel: marker, index: 3 sample + axis */
+#define MHI_STREAM_DRIFT 3     /* as WHITE */
+#define MHI_STREAM_HARMONIC 4  /* channel: muscle, index: harmonic */
+#define MHI_STREAM_GAIN 5      /* channel: muscle, index: 0 */
+#define MHI_STREAM_RAW 6       /* channel: electrode, index: sample */
+#define MHI_STREAM_AMPLIFIER 7 /* as RAW */
 
 /* ---- clock.c ---- */
 
@@ -60,8 +62,17 @@ mhe_status mhi_spans_read(const mhe_text_map *map, const mhi_map_place *place,
 void mhi_spans_apply(const mhi_span *spans, int32_t n, int32_t width, double value,
                      mhi_record *record);
 
-/* {subject: "other 0.2, another 0.1"} added to matrix [n x n]. MHE_E_CONFIG. */
+/* {reader: "source 0.2, another 0.1"} added to matrix [readers x sources]. MHE_E_CONFIG. */
 mhe_status mhi_fractions_read(const mhe_text_map *map, const mhi_map_place *place,
-                              const mhi_subjects *subjects, double *matrix, mhe_error *err);
+                              const mhi_subjects *readers, const mhi_subjects *sources,
+                              double *matrix, mhe_error *err);
+
+/* ---- emg.c ---- */
+
+/* MHE_E_INPUT: the reference lacks an excitation. */
+mhe_status mhi_noise_check_excitations(const mhi_recording *reference, const mhe_description *model,
+                                       mhe_error *err);
+/* [n_muscles], of the arena; NULL: memory is out. */
+const char **mhi_muscle_names(const mhe_description *model, mhi_arena *arena);
 
 #endif

@@ -59,6 +59,10 @@ mhe_status mhi_noise_recording(const mhi_noise *noise, const mhi_recording *refe
                                mhi_recording **recording, mhe_error *err) {
     mhi_record markers = {0}, emg = {0};
     *recording = NULL;
+    if (noise->raw_emg.electrodes.n > 0) {
+        return mhe_fail(err, MHE_E_CONFIG,
+                        "noise.raw_emg: raw EMG is for recordings in files (mhe-sim noise)");
+    }
     mhi_recording *r = calloc(1, sizeof *r);
     if (r == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
