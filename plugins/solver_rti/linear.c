@@ -246,26 +246,34 @@ double rti_gap_sum(const rti_solver *s, const rti_point *point) {
     return sum;
 }
 
-void rti_measure(rti_solver *s) {
-    rti_residuals *r = &s->residuals;
-    *r = (rti_residuals){0};
-    qp_slope(&s->shape, s->here.stages, NULL, s->lambda, s->slope);
+rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const double *lambda,
+                               const double *z_lower, const double *z_upper) {
+    rti_residuals r = {0};
+    qp_slope(&s->shape, point->stages, NULL, lambda, s->slope);
     for (int32_t k = 0; k <= s->shape.N; k++) {
         for (int32_t i = k < s->shape.N ? 0 : s->shape.n_u; i < s->shape.n_z; i++) {
             const ptrdiff_t at = (ptrdiff_t)k * s->shape.ld_z + i;
             if (s->lower[at] == s->upper[at]) {
                 continue; /* its multiplier bears any slope */
             }
-            const double below = s->z_lower[at], above = s->z_upper[at];
-            r->stationarity = fmax(r->stationarity, fabs(s->slope[at] - below + above));
-            r->complementarity =
-                fmax(r->complementarity, below > 0 ? below * (s->here.w[at] - s->lower[at]) : 0);
-            r->complementarity =
-                fmax(r->complementarity, above > 0 ? above * (s->upper[at] - s->here.w[at]) : 0);
+            const double below = z_lower[at], above = z_upper[at], w = point->w[at];
+            r.stationarity = fmax(r.stationarity, fabs(s->slope[at] - below + above));
+            r.complementarity = fmax(r.complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
+            r.complementarity = fmax(r.complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
         }
         for (int32_t i = 0; k < s->shape.N && i < s->shape.n_x; i++) {
-            r->gap = fmax(r->gap, fabs(s->here.stages[k].b[i]));
+            r.gap = fmax(r.gap, fabs(point->stages[k].b[i]));
         }
     }
+    return r;
+}
+
+double rti_excess(const rti_residuals *r) {
+    return fmax(r->stationarity, 10 * fmax(r->gap, r->complementarity));
+}
+
+void rti_measure(rti_solver *s) {
+    s->residuals = rti_residuals_of(s, &s->here, s->lambda, s->z_lower, s->z_upper);
+    s->least_excess = fmin(s->least_excess, rti_excess(&s->residuals));
     s->gap_sum = rti_gap_sum(s, &s->here);
 }

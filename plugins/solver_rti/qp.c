@@ -4,13 +4,14 @@
 #include <math.h>
 #include <string.h>
 
-#define SOFTNESS 1e-9     /* proximal weight in the multipliers of bounds */
-#define NEAREST 0.995     /* part of the way to the nearest bound that a step may go */
-#define SHORT 0.1         /* a step so short gets nowhere */
-#define LEAST_BARRIER 0.1 /* of the complementarity asked for */
-#define COLD_SLACK 0.1    /* least slack of a cold start */
-#define COLD_BARRIER 1.0  /* t z of a cold start */
-#define WARM_SLACK 1e-2   /* least slack and multiplier of a warm start: few bounds change sides */
+#define SOFTNESS 1e-9        /* proximal weight in the multipliers of bounds */
+#define LEAST_SOFTNESS 1e-13 /* ... at tight limits */
+#define NEAREST 0.995        /* part of the way to the nearest bound that a step may go */
+#define SHORT 0.1            /* a step so short gets nowhere */
+#define LEAST_BARRIER 0.1    /* of the complementarity asked for */
+#define COLD_SLACK 0.1       /* least slack of a cold start */
+#define COLD_BARRIER 1.0     /* t z of a cold start */
+#define WARM_SLACK 1e-2 /* least slack and multiplier of a warm start: few bounds change sides */
 #define WARM_MULTIPLIER 1e-4
 #define MAX_REGULARISATION 1e8
 
@@ -148,7 +149,16 @@ static double measure(qp *q) {
             }
         }
     }
+    q->open = sum;
     return q->n_inequalities > 0 ? sum / q->n_inequalities : 0;
+}
+
+/* Where bounds are redundant, their multipliers can move along a face, and a proximal term stops
+ * them once it outweighs the slacks: it follows the barrier down, but not where bounds cannot be
+ * met, for there it is all that keeps multipliers finite. */
+static double softness(const qp *q, double barrier) {
+    const double least = fmax(0.01 * barrier, 0.1 * q->feasibility);
+    return fmin(fmax(least, LEAST_SOFTNESS), SOFTNESS);
 }
 
 /* The matrix of the Newton system at the iterate. 0: cannot be factorised however regularised. */
@@ -161,7 +171,7 @@ static int32_t factorise(qp *q) {
         for (int32_t i = 0; i < q->n_sides; i++) {
             qp_side *side = &q->sides[i];
             side->weight =
-                i < q->n_inequalities ? side->z / (side->t + SOFTNESS * side->z) : 1 / SOFTNESS;
+                i < q->n_inequalities ? side->z / (side->t + q->softness * side->z) : 1 / SOFTNESS;
             q->diagonal[side->at] += side->weight;
         }
         if (riccati_factor(&q->riccati, q->stages, q->diagonal)) {
@@ -213,7 +223,7 @@ static void step(qp *q, double barrier, int32_t second_order) {
         if (i < q->n_inequalities) {
             const double target =
                 barrier - side->t * side->z - (second_order ? side->dt * side->dz : 0);
-            side->shift += target / (side->t + SOFTNESS * side->z);
+            side->shift += target / (side->t + q->softness * side->z);
         }
         q->rhs[side->at] -= side->sign * side->shift;
     }
@@ -225,7 +235,7 @@ static void step(qp *q, double barrier, int32_t second_order) {
         qp_side *side = &q->sides[i];
         const double move = side->sign * q->dw[side->at];
         side->dz = side->shift - side->weight * move;
-        side->dt = i < q->n_inequalities ? move + SOFTNESS * side->dz + side->residual : 0;
+        side->dt = i < q->n_inequalities ? move + q->softness * side->dz + side->residual : 0;
     }
 }
 
@@ -318,6 +328,7 @@ int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t
     int32_t result = QP_LIMIT;
     q->stages = stages;
     q->regularisation = limits->regularisation;
+    q->softness = SOFTNESS;
     q->refine = 0;
     begin(q, warm);
     double barrier = measure(q);
@@ -326,6 +337,7 @@ int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t
             result = QP_SOLVED;
             break;
         }
+        q->softness = fmin(q->softness, softness(q, barrier));
         if (!isfinite(q->stationarity + q->feasibility + barrier) || !factorise(q)) {
             result = QP_FAILED;
             break;

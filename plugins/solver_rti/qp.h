@@ -43,11 +43,12 @@ typedef struct qp {
     double *w, *lambda, *z_lower, *z_upper;
     int32_t iterations;
     double stationarity, feasibility, complementarity; /* residuals reached */
+    double open; /* sum of t z: what of the cost is left to gain where the others are 0 */
 
     uint8_t *fixed; /* [size_z] controls and first states with equal bounds: constants */
     qp_side *sides;
     int32_t n_sides, n_inequalities; /* equalities (later states with equal bounds) come last */
-    double regularisation;           /* now */
+    double regularisation, softness; /* now */
     int32_t refine;                  /* a Newton system needs a second solve */
     double *slope, *gap;             /* residuals of w [size_z] and of the dynamics [size_x] */
     double *diagonal, *rhs, *dw, *dlambda;        /* of a Newton system */

@@ -75,6 +75,7 @@ typedef struct rti_solver {
     int32_t warm;             /* the multipliers are worth a start */
     double gap_sum;           /* at `here` */
     rti_residuals residuals;  /* at the last linearisation */
+    double least_excess;      /* of the points of this solve, see rti_excess() */
     rti_leap leap;            /* of the last step, if a real-time iteration ended with it */
     double deadline;          /* this solve's; infinity: none */
     double iteration_time;    /* s, of this solve's last iteration */
@@ -102,7 +103,13 @@ void rti_rescale(rti_solver *s, rti_point *point, double factor);
 /* Puts Levenberg's term damping/2 |step|^2 on the Hessians in the place of the present one. */
 void rti_set_damping(rti_solver *s, rti_point *point, double damping);
 double rti_gap_sum(const rti_solver *s, const rti_point *point);
-/* Residuals at `here`; leaves the slope of the Lagrangian without bounds in s->slope. */
+/* Residuals at a point with these multipliers; overwrites s->slope. */
+rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const double *lambda,
+                               const double *z_lower, const double *z_upper);
+/* Their one number, to be compared with the tolerance: gaps and complementarity are held ten times
+ * tighter than the slope of the Lagrangian, as by solver_ipopt. */
+double rti_excess(const rti_residuals *r);
+/* Measures `here`. */
 void rti_measure(rti_solver *s);
 
 /* step.c: one iteration from `here`, whose derivatives are known. */

@@ -120,20 +120,13 @@ static double worst(const rti_residuals *r) {
     return fmax(r->stationarity, fmax(r->gap, r->complementarity));
 }
 
-/* Gaps and complementarity are held ten times tighter than the slope, as by solver_ipopt. */
-static int32_t is_optimal(const rti_solver *s) {
-    const double tolerance = s->config->tolerance;
-    return s->residuals.stationarity <= tolerance && s->residuals.gap <= 0.1 * tolerance &&
-           s->residuals.complementarity <= 0.1 * tolerance;
-}
-
 /* Why to stop before the next iteration: MHE_SOLVE_*, -1: not at all. */
 static int32_t verdict(const rti_solver *s, const mhe_solve_control *control, int32_t iteration,
                        int32_t limit) {
     const int32_t stop =
         control != NULL && control->progress != NULL &&
         control->progress(control->data, iteration, s->here.cost / s->scale, worst(&s->residuals));
-    if (is_optimal(s)) {
+    if (rti_excess(&s->residuals) <= s->config->tolerance) {
         return MHE_SOLVE_CONVERGED;
     }
     if (stop) {
@@ -227,6 +220,7 @@ static void tell_progress(const rti_solver *s, const mhe_solve_control *control,
 static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t *iterations) {
     const int32_t limit = iteration_limit(s), real_time = is_real_time(s);
     s->penalty = s->damping = 0;
+    s->least_excess = INFINITY;
     for (*iterations = 0;;) {
         rti_measure(s);
         const int32_t outcome = verdict(s, control, *iterations, limit);

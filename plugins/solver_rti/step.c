@@ -2,6 +2,7 @@
 /* step.c: from one iterate to the next. */
 #include "rti.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -9,6 +10,9 @@
 #define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
 #define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
 #define MOST_DAMPING 1e9
+#define NEARER                                                                         \
+    0.5 /* part of the least residual so far that a step may leave, whatever its merit \
+         */
 
 /* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
  * closely: what is left of them, times large multipliers, is noise in the merit function. */
@@ -30,7 +34,11 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
         memcpy(q->z_lower, s->z_lower, sizeof(double) * n);
         memcpy(q->z_upper, s->z_upper, sizeof(double) * n);
     }
-    return qp_solve(q, s->here.stages, &limits, s->warm);
+    const int32_t result = qp_solve(q, s->here.stages, &limits, s->warm);
+    /* Bounds missed by no more than the gap that a converged solve may leave are no contradiction.
+     */
+    return result == QP_INFEASIBLE && q->feasibility <= 0.1 * s->config->tolerance ? QP_LIMIT
+                                                                                   : result;
 }
 
 /* trial.w = here.w + length * step, within the bounds. */
@@ -174,6 +182,29 @@ static int32_t is_better(const rti_solver *s, double length, double slope) {
     return merit(s, &s->trial) <= before + ARMIJO * length * slope + 1e-12 * (1 + fabs(before));
 }
 
+/* What of a difference of merits means nothing: the part of the cost that the program, solved to
+ * its limits, leaves open, and rounding. */
+static double noise(const rti_solver *s) {
+    double size = 0;
+    for (size_t i = 0; i < size_z(&s->shape); i++) {
+        size += fabs(s->here.w[i]);
+    }
+    return s->qp.open + 10 * DBL_EPSILON * (fabs(s->here.cost) + s->penalty * size);
+}
+
+/* Close to the solution there is less to gain than noise, and the merit function is deaf. Is the
+ * trial point, with the multipliers of the program, then much nearer to the optimality conditions
+ * than any point of this solve? As their residual is halved each time, such steps come to an end.
+ */
+static int32_t is_nearer(rti_solver *s, double slope) {
+    if (-slope > noise(s)) {
+        return 0;
+    }
+    const rti_residuals r =
+        rti_residuals_of(s, &s->trial, s->qp.lambda, s->qp.z_lower, s->qp.z_upper);
+    return rti_excess(&r) <= NEARER * s->least_excess;
+}
+
 /* A second look at a full step that was refused: the program once more with the gaps that the step
  * left (second-order correction: Fletcher 1982; the penalty function else refuses good steps along
  * curved constraints, the Maratos effect). The refused point's gaps are in trial. */
@@ -231,7 +262,7 @@ static double try_step(rti_solver *s, int32_t result) {
     const double slope = merit_slope(s);
     reach(s, 1);
     const int32_t known = rti_evaluate(s, &s->trial, RTI_ALL);
-    if (known && is_better(s, 1, slope)) {
+    if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
         return 1;
     }
     if (known && result == QP_SOLVED && !is_late(s) && second_look(s, slope)) {

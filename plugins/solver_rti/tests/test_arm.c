@@ -81,8 +81,6 @@ typedef struct tally {
 } tally;
 
 static void compare(contender *rti, contender *ipopt, const mhe_estimator *e, tally *t) {
-    double *last = e->guess_x + (ptrdiff_t)e->n * e->n_x; /* to start with a gap */
-    memcpy(last, last - e->n_x, sizeof(double) * (size_t)e->n_x);
     const int by_rti = contender_solve(rti, e->guess_x, e->guess_u);
     const int by_ipopt = contender_solve(ipopt, e->guess_x, e->guess_u);
     const double x = difference(rti->at.x, ipopt->at.x, rti->n_x);
@@ -116,8 +114,7 @@ static void record(const test_fixture *f, mhi_recording *r, int noisy, mhi_recor
     }
 }
 
-/* The windows of the motion, each started as the estimator started it, but for the newest state. 0:
- * its file is not here. */
+/* The windows of the motion, each started as the estimator started it. 0: its file is not here. */
 static int follow(tally *t) {
     char path[512], yaml[2048];
     if (strcmp(t->motion, "demo") == 0) {
@@ -218,8 +215,9 @@ static void same_optimum_as_ipopt(void **state) {
 
 /* With noise about one window in ten of the paper's curves ends where an activation sits on a kink:
  * there the one-sided derivatives vanish nowhere, and neither solver meets a tolerance. Some others
- * have two stationary points close by. What must hold: this solver converges wherever Ipopt does,
- * and both come to the same objective, if not to the same digit. */
+ * have two stationary points close by, and which of them is found depends on the start. What must
+ * hold: this solver converges wherever Ipopt does, and both come to the same objective, if not to
+ * the same digit. */
 static void kinks_stop_both(void **state) {
     (void)state;
     tally t = {"demo", "excitation", TRACK, "paper2021", .noisy = 1, .every = 2};
@@ -229,8 +227,8 @@ static void kinks_stop_both(void **state) {
     assert_true(t.by_rti >= t.by_ipopt);
     assert_int_equal(t.both, t.by_ipopt);
     assert_true(t.by_rti >= 0.8 * t.windows);
-    assert_true(t.agree >= 0.95 * t.both);
-    assert_true(t.any_objective < 1e-5);
+    assert_true(t.agree >= 0.9 * t.both);
+    assert_true(t.any_objective < 1e-6);
 }
 
 int main(void) {
