@@ -62,6 +62,7 @@ typedef struct mhe_frame {
     double time;           /* s */
     const double *markers; /* [n_markers x 3], m, ground frame */
     const double *emg;     /* [n_muscles], normalised 0..1 */
+    const double *angles;  /* [n_q], measured coordinates, rad (m): target of the signal `q` */
 } mhe_frame;
 
 /* How a frame's estimate came about. */

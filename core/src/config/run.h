@@ -33,6 +33,7 @@ typedef struct mhi_model_section {
 
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
+    const char *angles;                    /* .sto .mot */
     double emg_offset;                     /* s, added to the EMG file's times */
     int32_t emg_delay;      /* frames by which the tracked EMG lags: activation-driven default 2,
                              * excitation-driven and with electrodes 0 (-1 in the file = by default) */

@@ -42,6 +42,9 @@ static const mhe_option data_options[] = {
                  "EMG, .sto, .mot or .c3d (analog): normalised, a column a muscle; or raw, a "
                  "column an electrode, "
                  "with emg.channels."),
+    MHE_OPT_PATH(mhi_data_section, angles, 0,
+                 "Measured joint angles, .sto or .mot, a column a coordinate: what the signal q is "
+                 "to be close to in mhe.cost.track, beside markers or in their place."),
     MHE_OPT_PATH(mhi_data_section, reference, 0,
                  "Known motion to start from and to compare with, .sto."),
     MHE_OPT_REAL(mhi_data_section, emg_offset, 0, -1e6, 1e6, "s",

@@ -14,8 +14,17 @@ static void guess_controls(mhe_estimator *e, int32_t k, double *a) {
     }
 }
 
+/* Measured angles of node k in the place of what q says. */
+static void take_angles(const mhe_estimator *e, int32_t k, double *q) {
+    for (int32_t i = 0; i < e->n_q; i++) {
+        const double angle = mhi_row(e->angles, k, e->n_q)[i];
+        const mhe_coordinate *c = &e->description->coordinates[i];
+        q[i] = isnan(angle) ? q[i] : mhi_clip(angle, c->lower, c->upper);
+    }
+}
+
 /* Inverse kinematics node by node -> q of guess_x, `distance` [n+1] of the markers, NaN without. A
- * node without markers takes the posture before it. */
+ * node without markers takes the posture before it; measured angles stand for themselves. */
 static mhe_status guess_postures(mhe_estimator *e, double *distance, double *nearest,
                                  mhe_error *err) {
     double *q = e->out_q; /* the last estimate, near where there was one */
@@ -30,6 +39,7 @@ static mhe_status guess_postures(mhe_estimator *e, double *distance, double *nea
         if (status != MHE_OK) {
             return status;
         }
+        take_angles(e, k, q);
         n_seen += !isnan(distance[k]);
         *nearest = fmin(*nearest, distance[k]);
         memcpy(mhi_row(e->guess_x, k, e->n_x), q, sizeof(double) * (size_t)e->n_q);

@@ -116,6 +116,8 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
                   {&e->distance, nodes},
                   {&e->steps, e->n},
                   {&e->emg, nodes * e->n_m},
+                  {&e->angles, nodes * e->n_q},
+                  {&e->no_angles, e->n_q},
                   {&e->delay_line, (e->delay + 1) * e->n_m},
                   {&e->solution.x, nodes * e->n_x},
                   {&e->solution.u, e->n * e->n_u},
@@ -152,6 +154,9 @@ static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
     }
     for (int32_t i = 0; i < e->n_m; i++) {
         e->no_emg[i] = NAN;
+    }
+    for (int32_t i = 0; i < e->n_q; i++) {
+        e->no_angles[i] = NAN;
     }
     mhi_estimator_forget_start(e);
     e->solution.size = sizeof e->solution;

@@ -34,6 +34,7 @@ struct mhe_estimator {
     double *markers; /* [(n+1) x 3 n_k] */
     double *trusted; /* the same, NaN where recover.c does not believe them */
     double *emg;     /* [(n+1) x n_m] */
+    double *angles;  /* [(n+1) x n_q] */
     /* EMG of the last frames, for the electromechanical delay. */
     double *delay_line; /* [(delay+1) x n_m] */
     int32_t delay;
@@ -77,7 +78,7 @@ struct mhe_estimator {
     double *start_q, *start_v;           /* known first state [n_q], NaN where free */
     double *torque_max;                  /* largest residual torques [n_q], N m; 0: none */
 
-    double *no_markers, *no_emg; /* all missing */
+    double *no_markers, *no_emg, *no_angles; /* all missing */
 
     /* The estimate handed out. */
     double *out_activation, *out_excitation, *out_force, *out_moment, *out_marker, *out_residual;
@@ -101,7 +102,8 @@ mhe_status mhi_clock_take(mhe_estimator *e, double time, int32_t *used, mhe_erro
 int32_t mhi_clock_measure(mhe_estimator *e);
 
 /* window.c */
-void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg);
+void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg,
+                       const double *angles);
 void mhi_window_skip(mhe_estimator *e, double time); /* a node without a measurement */
 void mhi_window_clear(mhe_estimator *e);             /* as if no frame had come yet */
 /* What can be done for the next solve before its newest frame is there: start, bounds, the solver's

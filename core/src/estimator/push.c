@@ -23,6 +23,12 @@ static const double *delayed_emg(mhe_estimator *e, const double *emg) {
     return e->delay_line + get * e->n_m;
 }
 
+/* Callers compiled before there were angles have a shorter frame. */
+static const double *measured_angles(const mhe_estimator *e, const mhe_frame *frame) {
+    const int known = frame->size >= offsetof(mhe_frame, angles) + sizeof frame->angles;
+    return known && frame->angles != NULL ? frame->angles : e->no_angles;
+}
+
 /* Everything that is told about a node; the last one has the controls that lead to it. */
 static mhe_status give_estimate(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_error *err) {
     const int32_t controls = k < e->n ? k : e->n - 1;
@@ -113,7 +119,8 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     if (!used) {
         return MHE_OK;
     }
-    mhi_window_append(e, frame->time, frame->markers == NULL ? e->no_markers : frame->markers, emg);
+    mhi_window_append(e, frame->time, frame->markers == NULL ? e->no_markers : frame->markers, emg,
+                      measured_angles(e, frame));
     mhi_recover_drop_emg(e);
     if (e->filled <= e->n) {
         return MHE_OK;

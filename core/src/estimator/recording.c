@@ -231,6 +231,35 @@ static void to_radians(double *values, int32_t n_frames, const mhe_description *
     }
 }
 
+/* Measured joint angles; without markers their times are the frames'. */
+static mhe_status read_angles(mhi_recording *r, const char *path, const mhe_description *d,
+                              const mhe_host *host, mhe_error *err) {
+    static const mhi_naming naming = {"coordinate", {"%s", "q_%s"}, 1};
+    mhi_table *table = NULL;
+    mhe_status status = mhi_sto_read(path, &table, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    pass_on_warnings(table, host);
+    const char **names = names_of(d, 'q', d->n_coordinates);
+    int32_t n_found = 0;
+    if (names == NULL) {
+        status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    } else if (r->time == NULL) {
+        status = set_times(r, table, err);
+    }
+    if (status == MHE_OK) {
+        status = read_quantity(r, table, &naming, names, d->n_coordinates, 1, 0, &r->angles,
+                               &n_found, host, err);
+    }
+    if (status == MHE_OK && table->in_degrees) {
+        to_radians(r->angles, r->n_frames, d);
+    }
+    free(names);
+    mhi_table_free(table);
+    return status;
+}
+
 static mhe_status read_reference(mhi_recording *r, const char *path, const mhe_description *d,
                                  const mhe_host *host, mhe_error *err) {
     static const mhi_naming q = {"coordinate", {"q_%s", "%s", "q%d"}, 0};
@@ -312,9 +341,13 @@ mhe_status mhi_recording_read_reference(const char *path, const mhe_description 
 mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, const mhe_host *host,
                               mhi_recording **recording, mhe_error *err) {
     *recording = NULL;
-    if (run->data.markers == NULL && run->data.emg == NULL) {
+    const mhi_data_section *data = &run->data;
+    const char *source = data->markers != NULL  ? data->markers
+                         : data->angles != NULL ? data->angles
+                                                : data->emg;
+    if (source == NULL) {
         return mhe_fail(err, MHE_E_CONFIG,
-                        "%s: data: neither 'markers' nor 'emg' is given: there is "
+                        "%s: data: neither 'markers' nor 'angles' nor 'emg' is given: there is "
                         "nothing to estimate from",
                         run->path);
     }
@@ -326,6 +359,10 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     if (run->data.markers != NULL) {
         status = read_markers(r, run, d, host, err);
     }
+    r->n_q = d->n_coordinates;
+    if (status == MHE_OK && data->angles != NULL) {
+        status = read_angles(r, data->angles, d, host, err);
+    }
     if (status == MHE_OK && run->data.emg != NULL) {
         status = read_emg(r, run, d, host, err);
     }
@@ -333,15 +370,14 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
         status = read_reference(r, run->data.reference, d, host, err);
     }
     if (status == MHE_OK) {
-        warn_uneven(r, run->data.markers != NULL ? run->data.markers : run->data.emg, host);
+        warn_uneven(r, source, host);
     }
     const int64_t span = (int64_t)run->horizon.window * run->horizon.ratio;
     if (status == MHE_OK && r->n_frames <= span) {
         status = mhe_fail(
             err, MHE_E_INPUT,
             "%s: %d frames are too few for a window of %d intervals at ratio %d, which needs %lld",
-            run->data.markers != NULL ? run->data.markers : run->data.emg, r->n_frames,
-            run->horizon.window, run->horizon.ratio, (long long)span + 1);
+            source, r->n_frames, run->horizon.window, run->horizon.ratio, (long long)span + 1);
     }
     if (status != MHE_OK) {
         mhi_recording_free(r);
@@ -357,7 +393,8 @@ mhe_frame mhi_recording_frame(const mhi_recording *r, int32_t n_markers, int32_t
                        .time = r->time[k],
                        .markers =
                            r->markers == NULL ? NULL : r->markers + (ptrdiff_t)k * 3 * n_markers,
-                       .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * n_muscles};
+                       .emg = r->emg == NULL ? NULL : r->emg + (ptrdiff_t)k * n_muscles,
+                       .angles = r->angles == NULL ? NULL : r->angles + (ptrdiff_t)k * r->n_q};
 }
 
 void mhi_recording_free(mhi_recording *r) {
@@ -367,6 +404,7 @@ void mhi_recording_free(mhi_recording *r) {
     free(r->time);
     free(r->markers);
     free(r->emg);
+    free(r->angles);
     free(r->reference.q);
     free(r->reference.qdot);
     free(r->reference.activation);

@@ -25,7 +25,9 @@ typedef struct mhi_recording {
     double *time;    /* [n_frames], s */
     double *markers; /* [n_frames x 3 n_k], m, NaN = missing; NULL without a markers file */
     double *emg;     /* [n_frames x n_m], NaN = missing; NULL without an EMG file */
-    double unit;     /* metres per unit of the marker file */
+    double *angles;  /* [n_frames x n_q], rad (m), NaN = missing; NULL without a file of angles */
+    int32_t n_q;
+    double unit; /* metres per unit of the marker file */
     char unit_name[8];
     int32_t n_markers_found, n_emg_found;
     mhi_emg_report emg_report;

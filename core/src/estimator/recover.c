@@ -86,9 +86,12 @@ void mhi_recover_drop_emg(mhe_estimator *e) {
 }
 
 int32_t mhi_recover_is_lost(const mhe_estimator *e) {
-    int32_t measured = 0; /* without markers there is nothing to begin from */
+    int32_t measured = 0; /* without markers or angles there is nothing to begin from */
     for (ptrdiff_t i = 0; i < (ptrdiff_t)(e->n + 1) * 3 * e->n_k && !measured; i++) {
         measured = !isnan(e->markers[i]);
+    }
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)(e->n + 1) * e->n_q && !measured; i++) {
+        measured = !isnan(e->angles[i]);
     }
     return measured && (e->implausible >= LOST_FRAMES || e->predicted >= e->n);
 }

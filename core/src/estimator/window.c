@@ -5,17 +5,19 @@
 
 #include <string.h>
 
-void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg) {
+void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg,
+                       const double *angles) {
     const int32_t k = e->filled++;
     const size_t bytes = sizeof(double) * (size_t)(3 * e->n_k);
     e->times[k] = time;
     memcpy(mhi_row(e->markers, k, 3 * e->n_k), markers, bytes);
     memcpy(mhi_row(e->trusted, k, 3 * e->n_k), markers, bytes);
     memcpy(mhi_row(e->emg, k, e->n_m), emg, sizeof(double) * (size_t)e->n_m);
+    memcpy(mhi_row(e->angles, k, e->n_q), angles, sizeof(double) * (size_t)e->n_q);
 }
 
 void mhi_window_skip(mhe_estimator *e, double time) {
-    mhi_window_append(e, time, e->no_markers, e->no_emg);
+    mhi_window_append(e, time, e->no_markers, e->no_emg, e->no_angles);
     if (e->filled > e->n) {
         if (e->begun) {
             mhi_window_follow(e);
@@ -77,9 +79,13 @@ void mhi_window_set_targets(mhe_estimator *e) {
         mhi_ocp_set_time(e->ocp, k, e->times[k]);
         double *markers = mhi_ocp_target(e->ocp, MHI_SIGNAL_MARKERS, k);
         double *controls = mhi_ocp_target(e->ocp, control, k);
+        double *angles = mhi_ocp_target(e->ocp, MHI_SIGNAL_Q, k);
         if (markers != NULL) {
             memcpy(markers, mhi_row(e->trusted, k, 3 * e->n_k),
                    sizeof(double) * (size_t)(3 * e->n_k));
+        }
+        if (angles != NULL) {
+            memcpy(angles, mhi_row(e->angles, k, e->n_q), sizeof(double) * (size_t)e->n_q);
         }
         if (controls != NULL) {
             memcpy(controls, mhi_row(e->emg, k, e->n_m), sizeof(double) * (size_t)e->n_m);
@@ -118,6 +124,7 @@ void mhi_window_advance(mhe_estimator *e) {
     shift_rows(e->times, n + 1, 1);
     shift_rows(e->markers, n + 1, 3 * e->n_k);
     shift_rows(e->trusted, n + 1, 3 * e->n_k);
+    shift_rows(e->angles, n + 1, e->n_q);
     shift_rows(e->emg, n + 1, e->n_m);
     e->filled--;
     e->prepared = 0;
