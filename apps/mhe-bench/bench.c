@@ -135,11 +135,15 @@ static mhe_status prepare_runs(bench *b, mhe_error *err) {
         if (status != MHE_OK) {
             return blame(&v->list[i], status, err);
         }
-        run->frames =
-            MHI_TAKE(&b->arena, double, (size_t)repeats *(size_t)run->rig.n_estimates_max);
+        int32_t taken = 0;
+        for (int32_t part = 0; part < N_PARTS; part++) {
+            run->parts[part] =
+                MHI_TAKE(&b->arena, double, (size_t)repeats *(size_t)run->rig.n_estimates_max);
+            taken += run->parts[part] != NULL;
+        }
         run->means = MHI_TAKE(&b->arena, double, repeats);
         run->firsts = MHI_TAKE(&b->arena, double, repeats);
-        if (run->frames == NULL || run->means == NULL || run->firsts == NULL) {
+        if (taken < N_PARTS || run->means == NULL || run->firsts == NULL) {
             return no_memory(err);
         }
     }
@@ -148,18 +152,23 @@ static mhe_status prepare_runs(bench *b, mhe_error *err) {
 
 /* The first estimate of a run, which starts from nothing, is told apart from the others. */
 static mhe_status run_once(bench_run *run, int32_t repeat, mhe_error *err) {
-    double *frames = run->frames + run->n, sum = 0;
+    double *parts[N_PARTS], sum = 0;
     int32_t n = 0;
-    mhe_status status = rig_run(&run->rig, frames, &n, err);
+    for (int32_t part = 0; part < N_PARTS; part++) {
+        parts[part] = run->parts[part] + run->n;
+    }
+    mhe_status status = rig_run(&run->rig, parts, &n, err);
     if (status != MHE_OK) {
         return blame(run->rig.variant, status, err);
     }
-    run->firsts[repeat] = frames[0];
-    if (n > 1) {
-        memmove(frames, frames + 1, sizeof(double) * (size_t)--n);
+    run->firsts[repeat] = parts[PART_FRAME][0];
+    const int32_t left_out = n > 1;
+    n -= left_out;
+    for (int32_t part = 0; part < N_PARTS && left_out; part++) {
+        memmove(parts[part], parts[part] + 1, sizeof(double) * (size_t)n);
     }
     for (int32_t i = 0; i < n; i++) {
-        sum += frames[i];
+        sum += parts[PART_FRAME][i];
     }
     run->means[repeat] = sum / n;
     run->n += n;
@@ -198,7 +207,9 @@ static mhe_status sum_up(bench *b, mhe_error *err) {
     for (int32_t i = b->setup->variants->n; i-- > 0;) {
         bench_run *run = &b->runs[i];
         run->ratio = ratio_of(run->means, b->runs[0].means, repeats, scratch);
-        run->spread = spread_of(run->frames, run->n);
+        for (int32_t part = 0; part < N_PARTS; part++) {
+            run->spread[part] = spread_of(run->parts[part], run->n);
+        }
         measure_sort(run->firsts, repeats);
         run->first = measure_median(run->firsts, repeats);
         measure_sort(run->means, repeats);

@@ -36,11 +36,12 @@ typedef struct bench_layer {
 /* Whole runs of one variant. */
 typedef struct bench_run {
     rig rig;
-    double *frames; /* [n] s: all estimates of all runs but their first; sorted when summed up */
+    double *parts[N_PARTS]; /* [n] s: all estimates of all runs but their first; sorted when
+                             * summed up */
     int32_t n;
     double *firsts; /* [repeats] s: first estimate of each run, from a cold start */
     double *means;  /* [repeats] s: mean time of an estimate but the first in each run */
-    bench_spread spread;
+    bench_spread spread[N_PARTS];
     double first; /* s, median */
     double rate;  /* estimates per second, of the median run */
     bench_ratio ratio;

@@ -51,7 +51,7 @@ static void add_runs(const bench *b, mhi_text *out) {
                  b->runs[0].rig.has_rmse ? "   q deg   force N" : "");
     for (int32_t i = 0; i < v->n; i++) {
         const bench_run *run = &b->runs[i];
-        const bench_spread *s = &run->spread;
+        const bench_spread *s = &run->spread[PART_FRAME];
         const rig *r = &run->rig;
         mhi_text_add(out, "%-*s %8.1f %8.3f %8.3f %8.3f %8.3f %8.3f %7.2f", width, v->list[i].name,
                      run->rate, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->most,
@@ -64,6 +64,22 @@ static void add_runs(const bench *b, mhi_text *out) {
     }
 }
 
+/* Where a frame's time goes, and how late its estimate is. */
+static void add_parts(const bench *b, mhi_text *out) {
+    const variants *v = b->setup->variants;
+    const int width = width_of_names(v);
+    mhi_text_add(out, "\n%-*s %11s %12s %8s %8s %8s %8s %12s %8s\n", width, "of it, ms",
+                 "prepare p50", "feedback p50", "p95", "p99", "p99.9", "max", "evaluate p50",
+                 "rest p50");
+    for (int32_t i = 0; i < v->n; i++) {
+        const bench_spread *s = b->runs[i].spread, *f = &s[PART_FEEDBACK];
+        mhi_text_add(out, "%-*s %11.3f %12.3f %8.3f %8.3f %8.3f %8.3f %12.3f %8.3f\n", width,
+                     v->list[i].name, 1e3 * s[PART_PREPARE].p50, 1e3 * f->p50, 1e3 * f->p95,
+                     1e3 * f->p99, 1e3 * f->p999, 1e3 * f->most, 1e3 * s[PART_EVALUATION].p50,
+                     1e3 * s[PART_REST].p50);
+    }
+}
+
 void report_table(const bench *b, mhi_text *out) {
     const rig *r = &b->runs[0].rig;
     mhi_text_add(out, "%s: %d coordinates, %d muscles, %d markers; %d %s of each variant\n\n",
@@ -71,10 +87,13 @@ void report_table(const bench *b, mhi_text *out) {
                  b->setup->repeats, b->setup->repeats == 1 ? "run" : "runs, in alternation,");
     add_layers(b, out);
     add_runs(b, out);
+    add_parts(b, out);
     mhi_text_add(
         out,
         "\nx: times the first variant, measured side by side. first: the first estimate of a "
-        "run, which the other columns leave out. All in %.0f s.\n",
+        "run, which the other columns leave out. prepare: before the frame is there; feedback: "
+        "from the frame to its estimate, of that evaluate: costs, dynamics and derivatives, rest: "
+        "quadratic programs and all else. All in %.0f s.\n",
         b->elapsed);
 }
 
@@ -133,7 +152,14 @@ static void json_run(cJSON *list, const bench_run *run) {
     add_number(iterations, "mean", r->iterations_sum / r->n_estimates);
     add_number(iterations, "max", r->iterations_max);
     add_number(o, "rate_hz", run->rate);
-    json_spread(o, "frame_ms", &run->spread, 1e3);
+    static const char *const keys[N_PARTS] = {[PART_FRAME] = "frame_ms",
+                                              [PART_PREPARE] = "prepare_ms",
+                                              [PART_FEEDBACK] = "feedback_ms",
+                                              [PART_EVALUATION] = "feedback_evaluation_ms",
+                                              [PART_REST] = "feedback_rest_ms"};
+    for (int32_t part = 0; part < N_PARTS; part++) {
+        json_spread(o, keys[part], &run->spread[part], 1e3);
+    }
     add_number(o, "first_frame_ms", 1e3 * run->first);
     json_ratio(o, &run->ratio);
     if (r->has_rmse) {

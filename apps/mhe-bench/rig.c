@@ -101,8 +101,34 @@ void rig_free(rig *r) {
     mhi_arena_free(&r->arena);
 }
 
-mhe_status rig_run(const rig *r, double *frame_seconds, int32_t *n, mhe_error *err) {
+/* Pushes a frame and prepares the next; *prepare: s of preparation since the last estimate. */
+static mhe_status run_frame(mhe_estimator *estimator, const mhe_frame *frame, double *const *parts,
+                            double *prepare, int32_t *n, mhe_error *err) {
+    mhe_estimate estimate = {.size = sizeof estimate};
+    int32_t ready = 0;
+    const double begin = measure_seconds();
+    mhe_status status = mhe_estimator_push(estimator, frame, &estimate, &ready, err);
+    const double pushed = measure_seconds();
+    if (status != MHE_OK) {
+        return status;
+    }
+    if (ready) {
+        parts[PART_FRAME][*n] = *prepare + (pushed - begin);
+        parts[PART_PREPARE][*n] = *prepare;
+        parts[PART_FEEDBACK][*n] = pushed - begin;
+        parts[PART_EVALUATION][*n] = estimate.evaluation_time;
+        parts[PART_REST][*n] = pushed - begin - estimate.evaluation_time;
+        *n += 1;
+        *prepare = 0;
+    }
+    status = mhe_estimator_prepare(estimator, err);
+    *prepare += measure_seconds() - pushed;
+    return status;
+}
+
+mhe_status rig_run(const rig *r, double *const *parts, int32_t *n, mhe_error *err) {
     mhe_estimator *estimator = NULL;
+    double prepare = 0;
     *n = 0;
     mhe_status status = mhi_estimator_create(r->variant->run, r->host, &estimator, err);
     if (status != MHE_OK) {
@@ -112,14 +138,7 @@ mhe_status rig_run(const rig *r, double *frame_seconds, int32_t *n, mhe_error *e
     for (int32_t k = 0; k < r->n_frames && status == MHE_OK; k++) {
         const mhe_frame frame =
             mhi_recording_frame(r->recording, r->info.n_markers, r->info.n_muscles, k);
-        mhe_estimate estimate = {.size = sizeof estimate};
-        int32_t ready = 0;
-        const double begin = measure_seconds();
-        status = mhe_estimator_push(estimator, &frame, &estimate, &ready, err);
-        const double end = measure_seconds();
-        if (status == MHE_OK && ready) {
-            frame_seconds[(*n)++] = end - begin;
-        }
+        status = run_frame(estimator, &frame, parts, &prepare, n, err);
     }
     mhe_estimator_close(estimator);
     return status;

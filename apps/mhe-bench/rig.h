@@ -35,8 +35,16 @@ mhe_status rig_create(const variant *v, int32_t estimates, const mhe_host *loud,
                       const mhe_host *silent, rig *r, mhe_error *err);
 void rig_free(rig *r);
 
-/* A whole run on a new estimator: seconds of each push that gave an estimate, in frame [n <=
- * n_estimates_max]. Making the estimator is not timed. */
-mhe_status rig_run(const rig *r, double *frame, int32_t *n, mhe_error *err);
+/* Parts of a frame's time. */
+#define PART_FRAME 0      /* preparation and feedback */
+#define PART_PREPARE 1    /* before the frame is there */
+#define PART_FEEDBACK 2   /* from the frame to its estimate */
+#define PART_EVALUATION 3 /* of the feedback: costs, dynamics, derivatives */
+#define PART_REST 4       /* of the feedback: quadratic programs and what else the solver does */
+#define N_PARTS 5
+
+/* A whole run on a new estimator, prepared between the frames: seconds of each estimate, in
+ * parts[i] [n <= n_estimates_max]. Making the estimator is not timed. */
+mhe_status rig_run(const rig *r, double *const *parts, int32_t *n, mhe_error *err);
 
 #endif

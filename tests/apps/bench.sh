@@ -27,7 +27,7 @@ has() {
 "$bench" "$demo" --quick --repeats 1 --vary formulation=excitation,activation --vary horizon.window=2,3 --out result \
     > table.txt 2> err.txt || fail "exit status $?: $(cat err.txt)"
 grep -v 'no picture: gnuplot cannot be started' err.txt | grep . && fail "messages"
-has table.txt p50 p95 p99 max 'x med' 'skeleton kinematics' 'system acceleration, derivatives' 'activation rates' \
+has table.txt p50 p95 p99 max 'x med' 'prepare p50' 'feedback p50' p99.9 'evaluate p50' 'rest p50' 'skeleton kinematics' 'system acceleration, derivatives' 'activation rates' \
     'shooting interval with A and B' 'stage cost' 'linearisation of the window' \
     'formulation=excitation horizon.window=2' 'formulation=activation horizon.window=3'
 json=result/bench.json
@@ -51,6 +51,12 @@ for item in bench["layers"] + bench["runs"]:
     assert 0 < t["p50"] <= t["p95"] <= t["p99"] <= t["p99.9"] <= t["max"]
     r = item["ratio_to_first"]
     assert 0 < r["min"] <= r["median"] <= r["max"]
+for run in bench["runs"]: # the parts of a frame
+    frame, feedback = run["frame_ms"], run["feedback_ms"]
+    assert 0 < run["prepare_ms"]["p50"] < frame["p50"]
+    assert 0 < feedback["p50"] <= feedback["p99.9"] <= feedback["max"] < frame["max"]
+    assert 0 < run["feedback_evaluation_ms"]["p50"] < feedback["p50"]
+    assert 0 < run["feedback_rest_ms"]["p50"] < feedback["p50"]
 END
 fi
 [ -s result/rate.gp ] || fail "no rate.gp"

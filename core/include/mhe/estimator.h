@@ -92,6 +92,7 @@ typedef struct mhe_estimate {
     const double *residual;   /* residual joint torques [n_residual_torques], N m */
     const double *markers;    /* [n_markers x 3], m */
     double latency;           /* s from the call of push to the estimate */
+    double evaluation_time;   /* s of it spent on costs, dynamics and their derivatives */
 } mhe_estimate;
 
 /* Opens a config file with `set` [n_set] assignments "path.to.key=value". `host` may be NULL

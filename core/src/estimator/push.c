@@ -145,6 +145,7 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     }
     estimate->iterations = info.iterations;
     estimate->kkt_residual = info.kkt_residual;
+    estimate->evaluation_time = info.evaluation_time;
     *ready = 1;
     return MHE_OK;
 }

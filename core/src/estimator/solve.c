@@ -94,12 +94,13 @@ static void set_proximal_weight(mhe_estimator *e, double factor) {
 static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
     mhe_status status = MHE_OK;
     int32_t iterations = 0, cut = 0;
-    double factor = 1;
+    double factor = 1, evaluation_time = 0;
     while (!e->settled && !cut && status == MHE_OK) {
         memcpy(e->prior_centre, e->solution.x, sizeof(double) * (size_t)e->n_x);
         set_proximal_weight(e, factor);
         status = solve_once(e, info, err);
         iterations += info->iterations;
+        evaluation_time += info->evaluation_time;
         const int32_t converged = status == MHE_OK && info->outcome == MHE_SOLVE_CONVERGED;
         const int32_t over = status == MHE_OK && info->outcome == MHE_SOLVE_DEADLINE;
         e->rounds += !over;
@@ -115,6 +116,7 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
         set_proximal_weight(e, 0);
     }
     info->iterations = iterations;
+    info->evaluation_time = evaluation_time;
     return status;
 }
 
