@@ -2,6 +2,7 @@
 /* mhe-study: many estimates under many conditions, and what they come to. */
 #include "arguments.h"
 #include "console.h"
+#include "report.h"
 #include "run.h"
 #include "study.h"
 
@@ -15,7 +16,8 @@ static const char help[] =
     "\n"
     "  mhe-study run STUDY.yaml [--out DIR] [--workers N] [--set path.to.key=value]... [--quiet]\n"
     "  mhe-study run --check STUDY.yaml [--set path.to.key=value]...\n"
-    "  mhe-study merge DIR [DIR]... \n"
+    "  mhe-study report DIR [--quiet]\n"
+    "  mhe-study merge DIR [DIR]...\n"
     "  mhe-study --version | --help\n"
     "\n"
     "run: every trial of the study that DIR (default ./out/<study's name>) has no result of; a "
@@ -25,6 +27,8 @@ static const char help[] =
     "same to the byte on any number of workers), timing.csv. --shard 0/8 ... 7/8 does one of "
     "eight\n"
     "parts, in a process or on a machine of its own.\n"
+    "report: statistics, figures and a page in DIR/report, as the study's section 'report' asks;\n"
+    "it needs Debian's python3-pandas, python3-statsmodels and python3-matplotlib.\n"
     "merge: the tables of what DIR has, with the rows of other folders of the same study.\n"
     "'mhe-study run --help' shows every key of a study file.\n"
     "Exit status: 0 done; 1 failed, interrupted or incomplete; 2 the command line or an input is\n"
@@ -51,6 +55,7 @@ static const struct command {
     mhe_status (*run)(const arguments *a, const mhe_host *host, mhe_error *err);
     mhe_status (*help)(mhe_error *err);
 } commands[] = {{"run", ARGUMENTS_RUN, run_study, help_run},
+                {"report", ARGUMENTS_FOLDER, report_make, help_all},
                 {"merge", ARGUMENTS_FOLDER, run_merge, help_all}};
 #define N_COMMANDS ((int32_t)(sizeof commands / sizeof commands[0]))
 

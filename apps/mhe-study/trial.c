@@ -169,15 +169,22 @@ void trial_cells(trial_result *r, mhi_text *cells) {
 
 void trial_timing(trial_result *r, mhi_text *cells) {
     static const double at[] = {0.5, 0.95, 0.99, 1};
-    const double mean = tally_mean_ms(&r->tally);
-    tally_sort(&r->tally);
-    if (isfinite(mean)) {
-        mhi_text_add(cells, "%.6g", 1e3 / mean);
+    const tally *t = &r->tally;
+    const double first = t->n_solves > 0 ? t->solve_ms[0] : NAN;
+    const int32_t skip = t->n_solves > 1, n = t->n_solves - skip; /* the first starts cold */
+    double *times = n > 0 ? t->solve_ms + skip : NULL, sum = 0;
+    for (int32_t i = 0; i < n; i++) {
+        sum += times[i];
     }
-    add_number(cells, mean);
+    if (n > 0) {
+        mhi_text_add(cells, "%.6g", 1e3 * n / sum);
+        measure_sort(times, n);
+    }
+    add_number(cells, n > 0 ? sum / n : NAN);
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++) {
-        add_number(cells, measure_percentile(r->tally.solve_ms, r->tally.n_solves, at[i]));
+        add_number(cells, measure_percentile(times, n, at[i]));
     }
+    add_number(cells, first);
     add_number(cells, r->seconds);
     add_number(cells, tally_peak_rss_mb());
 }

@@ -141,24 +141,26 @@ static mhe_status start(crew *c, int32_t number, mhe_error *err) {
 static mhe_status record_crash(crew *c, int32_t number, int32_t at, int signal_number,
                                mhe_error *err) {
     trial_result none = {.failed = 1};
-    mhi_text cells = {0};
+    mhi_text cells = {0}, timing = {0};
     char reason[80];
     row_writer w;
     (void)snprintf(reason, sizeof reason, "the trial ended its worker by signal %d (%s)",
                    signal_number, strsignal(signal_number));
     trial_cells(&none, &cells);
+    trial_timing(&none, &timing);
     mhe_status status = rows_open(c->setup->dir, c->setup->own, number, &w, err);
     if (status == MHE_OK) {
-        status = cells.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                              : append(&w, c->setup->tasks[at], cells.data, ",,,,,,,", reason, err);
+        status = cells.failed || timing.failed
+                     ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                     : append(&w, c->setup->tasks[at], cells.data, timing.data, reason, err);
     }
-    if (status == MHE_OK) {
-        status = rows_close(&w, err);
-    }
+    mhe_error late = {0};
+    const mhe_status closed = rows_close(&w, status == MHE_OK ? err : &late);
     mhi_text_free(&cells);
+    mhi_text_free(&timing);
     atomic_fetch_add(&c->board->done, 1);
     atomic_fetch_add(&c->board->failed, 1);
-    return status;
+    return status == MHE_OK ? closed : status;
 }
 
 /* Somebody's kill, the machine's lack of memory included, is no property of the trial. */

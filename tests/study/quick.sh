@@ -1,0 +1,71 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# The shipped studies in short, from motions to the page: nothing fails, tables and figures are there and hold numbers; the
+# long ones are sound.
+#   quick.sh PATH/mhe-study SOURCE_DIR
+set -u
+study=$1 source=$2
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+export XDG_CACHE_HOME="$work/cache"
+failed=0
+fail() {
+    echo "FAILED $*"
+    failed=$((failed + 1))
+}
+
+for file in "$source"/models/arm*/studies/study-*.yaml; do
+    "$study" run --check "$file" > out.txt 2> err.txt || fail "--check $file: $(cat err.txt)"
+done
+
+python=${MHE_PYTHON:-/usr/bin/python3}
+"$python" -c 'import pandas, statsmodels, matplotlib' 2> /dev/null && reports=1 || reports=0
+[ $reports -eq 1 ] || echo "no reports: python3-pandas, python3-statsmodels or python3-matplotlib is not installed"
+
+# quick FILE FILES_OF_THE_REPORT...
+quick() {
+    name=$(basename "$1" .yaml)
+    begin=$(date +%s)
+    "$study" run "$1" --out "$name" --quiet > out.txt 2> err.txt || fail "$name: $(cat err.txt)"
+    grep -q ' 0 trials failed' out.txt || fail "$name: $(cat out.txt)"
+    shift
+    if [ $reports -eq 1 ]; then
+        "$study" report "$name" > out.txt 2> err.txt || fail "report of $name: $(cat err.txt)"
+        [ -s err.txt ] && fail "report of $name warns: $(cat err.txt)"
+        for made in "$@" conditions.csv conditions.md report.html; do
+            [ -s "$name/report/$made" ] || fail "$name: no $made"
+        done
+        # All in one file.
+        grep -Eq '(src|href)="?(http|[a-z]*\.(png|css|js))' "$name/report/report.html" && fail "$name: the page needs other files"
+        grep -c '<img' "$name/report/report.html" | awk '$1 < 1 { exit 1 }' || fail "$name: no figure on the page"
+    fi
+    echo "$name: $(($(date +%s) - begin)) s"
+}
+
+quick "$source/models/arm19/studies/study-noise-quick.yaml" figure2.pdf figure5.png figure6.pdf figure7.png figure8.pdf \
+    anova-force.csv anova-angles.md pairs-force.csv
+quick "$source/models/arm19/studies/study-window-quick.yaml" figure3.pdf figure4.png rate.csv
+quick "$source/models/arm19/studies/study-emg-subset-quick.yaml" force.pdf anova-force.csv
+quick "$source/models/arm35/studies/study-muscles-quick.yaml" rate.png
+
+# What the section may say is told where it is wrong, and what it shows can change without running anything again.
+if [ $reports -eq 1 ]; then
+    cp "$source"/models/arm19/studies/*.yaml .
+    sed -i "s|: \.\./|: $source/models/arm19/|" ./*.yaml
+    "$study" run study-emg-subset-quick.yaml --out changed --set trials=1 --quiet > out.txt 2> err.txt || fail "changed: $(cat err.txt)"
+    sed -i 's/y: force_n, x: cocontraction/y: q_deg, x: cocontraction/; s/name: force, y: q_deg/name: angles, y: q_deg/' study-emg-subset-quick.yaml
+    "$study" report changed --quiet > out.txt 2> err.txt || fail "changed report: $(cat err.txt)"
+    [ -s changed/report/angles.pdf ] || fail "the changed section is not used"
+    sed -i 's/y: q_deg, x/y: q_degg, x/' study-emg-subset-quick.yaml
+    "$study" report changed --quiet > out.txt 2> err.txt
+    status=$?
+    [ $status -eq 2 ] && grep -q "no column 'q_degg'" err.txt || fail "an unknown column: $status, $(cat err.txt)"
+    sed -i 's/^seed:.*/seed: 5/' study-emg-subset-quick.yaml
+    "$study" report changed --quiet > out.txt 2> err.txt
+    status=$?
+    [ $status -eq 2 ] && grep -q 'study.id:4' err.txt || fail "a changed study: $status, $(cat err.txt)"
+fi
+
+[ $failed -eq 0 ] && echo "quick: all as it should be"
+[ $failed -eq 0 ]
