@@ -11,6 +11,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define DIGITS 16
@@ -210,12 +211,28 @@ static mhe_status write_failed(const row_writer *w, mhe_error *err) {
     return mhe_fail(err, MHE_E_IO, "%s: cannot be written: %s", w->path, strerror(errno));
 }
 
+/* A worker that was killed may have left half a line, which the next one must not go on with. */
+static int cut_half_line(int fd) {
+    char end[1 << 16];
+    struct stat info;
+    if (fstat(fd, &info) != 0) {
+        return -1;
+    }
+    const off_t from = info.st_size > (off_t)sizeof end ? info.st_size - (off_t)sizeof end : 0;
+    const ssize_t n = pread(fd, end, sizeof end, from);
+    ssize_t whole = n;
+    while (whole > 0 && end[whole - 1] != '\n') {
+        whole--;
+    }
+    return n < 0 ? -1 : whole == n ? 0 : ftruncate(fd, from + whole);
+}
+
 mhe_status rows_open(const char *dir, const char *own, int32_t worker, row_writer *w,
                      mhe_error *err) {
     *w = (row_writer){.fd = -1, .synced = measure_seconds()};
     (void)snprintf(w->path, sizeof w->path, "%s/rows/%s-%d" SUFFIX, dir, own, (int)worker);
-    w->fd = open(w->path, O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0666);
-    return w->fd < 0 ? write_failed(w, err) : MHE_OK;
+    w->fd = open(w->path, O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC, 0666);
+    return w->fd < 0 || cut_half_line(w->fd) != 0 ? write_failed(w, err) : MHE_OK;
 }
 
 /* The reason is one line without tabs. */
