@@ -128,7 +128,8 @@ static void compose(mhi_text *out, const char *name, const char *summary,
     mhi_text_add(out,
                  "</pre>\n<p>Blue: estimated. Orange: measured. Time from %.4g to %.4g s.</p>\n",
                  tables[0]->time[0], tables[0]->time[tables[0]->n_rows - 1]);
-    add_all(out, "Joint coordinates (degrees; of sliders 1/57.3 m)", tables[0], "q_", NULL, DEGREES, 1);
+    add_all(out, "Joint coordinates (degrees; of sliders 1/57.3 m)", tables[0], "q_", NULL, DEGREES,
+            1);
     add_all(out, "Activation against EMG", tables[0], "a_", tables[3], 1, 0.1);
     add_all(out, "Muscle forces (N)", tables[1], "", NULL, 1, 10);
     add_all(out, "Distance of markers (mm)", tables[2], "", NULL, 1e3, 1);

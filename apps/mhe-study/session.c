@@ -120,6 +120,7 @@ mhe_status session_take_shard(session *s, const char *own, mhe_error *err) {
     const char *path = mhi_arena_format(&s->arena, "%s/rows/%s.lock", s->dir, own);
     mhe_status status = path == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                                      : take_lock(s, path, PATIENCE, &s->lock, err);
+    rows_free(&s->rows); /* of the folder before */
     return status == MHE_OK ? rows_read(&s->study, s->dir, own, &s->rows, err) : status;
 }
 

@@ -106,7 +106,8 @@ static void failures(void **state) {
     struct test_integrator flow = test_integrator_open(SUNDIALS, "", &system, NULL);
     double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
     mhe_error err = {0};
-    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err), MHE_RETRY);
+    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+                     MHE_RETRY);
     assert_string_equal(err.text, "outside");
     x[0] = 101;
     assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
@@ -118,7 +119,8 @@ static void failures(void **state) {
     test_integrate(&flow, x, u, 0.03, next, NULL, NULL);
     test_integrator_close(&flow);
     flow = test_integrator_open(SUNDIALS, "max_steps: 3", &system, NULL);
-    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err), MHE_RETRY);
+    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+                     MHE_RETRY);
     assert_non_null(strstr(err.text, "CVODES"));
     test_integrator_close(&flow);
 }

@@ -62,6 +62,8 @@ edit 's/costs.0: mhe.cost.emg-markers-low/costs.0: {plugin: mhe.cost.emg-markers
 expect plugin-refuses-muscle 'BRAA'
 edit 's/^noise: .*/noise: {markers: {sd: -1}}/'
 expect refused-noise "small.yaml:12: noise.markers: 'sd'"
+edit 's/^noise: .*/noise: {raw_emg: {rate: 1000}}/'
+expect raw-emg "small.yaml:12: noise: 'raw_emg' is for recordings"
 edit 's/\[3, 3\], emg_noise: none/[3], emg_noise: none/'
 expect tuple-too-short 'a list of 2'
 edit 's/emg_noise: low,/emg_noise: [low, none],/'

@@ -185,6 +185,10 @@ mhe_status mhi_noise_read(const mhi_tree *tree, mhi_arena *arena, mhi_noise *noi
             status = read_section(&source, &config, &sections[i], err);
         }
     }
+    if (status == MHE_OK && section_node(tree, "noise.raw_emg") != NULL) {
+        status = mhi_fail_at(err, MHE_E_CONFIG, tree, section_node(tree, "noise.raw_emg"),
+                             "noise: 'raw_emg' is for recordings that are written to files");
+    }
     *noise = config.noise;
     set_places(noise, tree);
     return status;
