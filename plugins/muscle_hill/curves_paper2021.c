@@ -6,30 +6,40 @@
  * types: "hillthelen" where the file says Thelen, else "hill".
  *
  * Kinks: fv at s = 0, slope of shortening taken there; fp switches on where the *fibre* length
- * passes the tendon slack length (a jump; the slopes are those of either side). */
+ * passes the tendon slack length (a jump, unless passive_ramp spreads it; the slopes are those of
+ * either side). */
 #include "hill.h"
 #include "shapes.h"
 
 #define PAPER_SPEED 0.1   /* 1 / (10 m/s) */
 #define PAPER_DAMPING 0.1 /* of F_max at 10 optimal lengths per second */
 
+/* Off up to the switch; with a ramp it rises over the lengths before it, and is what it was from
+ * there on. */
+static struct hill_shape paper_passive(const struct hill_muscle *muscle, double n, double offset) {
+    const double from = muscle->passive_from, ramp = muscle->passive_ramp;
+    if (!(n > from - ramp)) {
+        return (struct hill_shape){0, 0};
+    }
+    struct hill_shape fp = hill_exponential(n, 10, offset, muscle->passive_scale);
+    if (n <= from) {
+        const struct hill_shape part = hill_rise((n - from) / ramp + 1);
+        fp.slope = part.value * fp.slope + part.slope / ramp * fp.value;
+        fp.value *= part.value;
+    }
+    return fp;
+}
+
 static void paper_hill(const struct hill_muscle *muscle, double a, double n, double s,
                        struct hill_value *out) {
     double fl_a;
-    struct hill_shape fl = hill_moving_bell(a, n, &fl_a), fp = {0, 0};
-    if (n > muscle->passive_from) {
-        fp = hill_exponential(n, 10, 0, muscle->passive_scale);
-    }
-    hill_total(a, fl, fl_a, hill_hyperbola(s), fp, out);
+    struct hill_shape fl = hill_moving_bell(a, n, &fl_a);
+    hill_total(a, fl, fl_a, hill_hyperbola(s), paper_passive(muscle, n, 0), out);
 }
 
 static void paper_hill_thelen(const struct hill_muscle *muscle, double a, double n, double s,
                               struct hill_value *out) {
-    struct hill_shape fp = {0, 0};
-    if (n > muscle->passive_from) {
-        fp = hill_exponential(n, 10, 1, muscle->passive_scale);
-    }
-    hill_total(a, hill_bell(n, 0.45), 0, hill_hyperbola(s), fp, out);
+    hill_total(a, hill_bell(n, 0.45), 0, hill_hyperbola(s), paper_passive(muscle, n, 1), out);
 }
 
 static int paper_says_thelen(const mhe_muscle *muscle) {
@@ -38,7 +48,6 @@ static int paper_says_thelen(const mhe_muscle *muscle) {
 
 static void paper_prepare(const mhe_muscle *muscle, const struct hill_config *config,
                           struct hill_muscle *out) {
-    (void)config;
     int thelen = paper_says_thelen(muscle);
     out->curve = thelen ? paper_hill_thelen : paper_hill;
     out->inv_cos = 1 / cos(hill_or(muscle->pennation_angle, 0));
@@ -46,6 +55,7 @@ static void paper_prepare(const mhe_muscle *muscle, const struct hill_config *co
     out->speed = PAPER_SPEED;
     out->damping = PAPER_DAMPING * out->inverse;
     out->passive_from = out->l_slack * out->inverse;
+    out->passive_ramp = config->passive_ramp;
     out->passive_scale = thelen ? 1 / expm1(5) : exp(-5);
 }
 

@@ -17,9 +17,10 @@ struct hill_config {
     double tau_act;   /* s; 0: the file's, else 0.010 */
     double tau_deact; /* s; 0: the file's, else 0.040 */
     double activation_smoothing;
-    double damping; /* below 0: the file's, else 0 */
-    double vmax;    /* optimal lengths per second; 0: the file's, else 10 */
-    double passive; /* factor of the passive force */
+    double damping;      /* below 0: the file's, else 0 */
+    double vmax;         /* optimal lengths per second; 0: the file's, else 10 */
+    double passive;      /* factor of the passive force */
+    double passive_ramp; /* n below a jump of the passive force over which it grows; 0: a jump */
 };
 
 /* a fl fv + fp and its derivatives by a, n and s. */
@@ -43,6 +44,7 @@ struct hill_muscle {
     double height;  /* constant thickness: l_opt sin(pennation), m; 0: constant angle */
     /* shapes of the passive and active curves, where a set has them to choose */
     double passive_from;   /* n above which fp acts */
+    double passive_ramp;   /* n below it over which fp grows from 0 */
     double passive_rate;   /* exponent per unit of n */
     double passive_offset; /* taken off the exponential */
     double passive_scale;  /* 1 / (exp(k_PE) - 1) or the like */

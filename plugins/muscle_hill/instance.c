@@ -71,6 +71,12 @@ static mhe_status hill_check_config(const mhe_host *host, const struct hill_conf
         return mhe_fail(err, MHE_E_CONFIG, "%s: the curves %s fix it; leave the option out",
                         config->vmax > 0 ? "vmax" : "damping", set->name);
     }
+    if (set != &hill_paper2021 && config->passive_ramp > 0) {
+        return mhe_fail(err, MHE_E_CONFIG,
+                        "passive_ramp: the curves %s do not switch the passive force on; leave the "
+                        "option out",
+                        set->name);
+    }
     if (config->curves == 0) {
         char line[96];
         (void)snprintf(line, sizeof line, "muscle curves: %s (none chosen)", set->name);

@@ -20,6 +20,9 @@ static const mhe_option hill_options[] = {
     MHE_OPT_REAL(struct hill_config, passive, 1, 0, 10, "1",
                  "Factor of the passive fibre force; below 1 where straight paths or scaling "
                  "stretch muscles beyond what is real, 0: none."),
+    MHE_OPT_REAL(struct hill_config, passive_ramp, 0, 0, 0.5, "1",
+                 "Optimal lengths before the onset of paper2021's passive force over which it "
+                 "rises smoothly; 0: the jump as it was."),
 };
 
 static const mhe_plugin hill_plugin = {

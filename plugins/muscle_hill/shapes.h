@@ -37,6 +37,11 @@ static inline struct hill_shape hill_exponential(double n, double rate, double o
     return (struct hill_shape){grown - offset * scale, rate * grown};
 }
 
+/* Cubic step of slope 0 at both ends: 0 at t = 0, 1 at t = 1. */
+static inline struct hill_shape hill_rise(double t) {
+    return (struct hill_shape){t * t * (3 - 2 * t), 6 * t * (1 - t)};
+}
+
 /* Sum over i of b[i][0] exp(-0.5 (n - b[i][1])^2 / (b[i][2] + b[i][3] n)^2)
  * (De Groote et al. 2016, doi:10.1007/s10439-016-1591-9). */
 struct hill_shape hill_three_bells(const double b[3][4], double n);

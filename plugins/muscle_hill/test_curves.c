@@ -5,7 +5,7 @@
 #include <string.h>
 
 static const char *const sets[] = {"curves: paper2021", "curves: biorbd", "curves: degroote2016",
-                                   "curves: thelen2003"};
+                                   "curves: thelen2003", "{curves: paper2021, passive_ramp: 0.3}"};
 static const int32_t types[] = {
     MHE_MUSCLE_UNSTATED,   MHE_MUSCLE_HILL,        MHE_MUSCLE_HILL_THELEN, MHE_MUSCLE_HILL_DEGROOTE,
     MHE_MUSCLE_THELEN2003, MHE_MUSCLE_MILLARD2012, MHE_MUSCLE_DEGROOTE2016};
@@ -189,6 +189,29 @@ static void slack_tendon(void **state) {
     }
 }
 
+/* The passive force of paper2021 (l_opt 0.1, slack length 0.2: it begins at n = 2) with a ramp:
+ * that of the jump above n = 2 and below the ramp, half of it halfway, and no corner at either end.
+ */
+static void ramp_instead_of_a_jump(void **state) {
+    (void)state;
+    const char *jump = "curves: paper2021", *ramp = "{curves: paper2021, passive_ramp: 0.02}";
+    const int32_t both[] = {MHE_MUSCLE_HILL, MHE_MUSCLE_HILL_THELEN};
+    for (int i = 0; i < 2; i++) {
+        const double full = normal_force(both[i], jump, 0, 2 + 1e-12, 0);
+        close_to(normal_force(both[i], ramp, 0, 2.001, 0), normal_force(both[i], jump, 0, 2.001, 0),
+                 0);
+        close_to(normal_force(both[i], jump, 0, 1.999, 0), 0, 0);
+        close_to(normal_force(both[i], ramp, 0, 1.979, 0), 0, 0);
+        close_to(normal_force(both[i], ramp, 0, 1.98 + 1e-6, 0), 0, 1e-8 * full);
+        close_to(normal_force(both[i], ramp, 0, 1.99, 0) / full, 0.5 * exp(-10 * 0.01), 1e-3);
+        close_to(normal_force(both[i], ramp, 0, 2 - 1e-9, 0) / full, 1, 1e-7);
+    }
+    const mhe_muscle m = test_muscle(MHE_MUSCLE_HILL, 500, 0.1, 0.2, 0);
+    const struct test_hill hill = test_hill(&m, 1, "{curves: biorbd, passive_ramp: 0.02}");
+    assert_null(hill.ops);
+    assert_int_equal(hill.err.code, MHE_E_CONFIG);
+}
+
 static void options_matter(void **state) {
     (void)state;
     const int32_t any = MHE_MUSCLE_UNSTATED;
@@ -242,6 +265,7 @@ int main(void) {
                                        cmocka_unit_test(landmarks),
                                        cmocka_unit_test(thelen_velocity_is_inverted),
                                        cmocka_unit_test(slack_tendon),
+                                       cmocka_unit_test(ramp_instead_of_a_jump),
                                        cmocka_unit_test(options_matter),
                                        cmocka_unit_test(refusals)};
     return cmocka_run_group_tests(tests, NULL, NULL);
