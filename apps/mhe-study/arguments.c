@@ -35,7 +35,7 @@ static mhe_status shard_of(const char *value, arguments *a, mhe_error *err) {
     return MHE_OK;
 }
 
-enum { OUT, SET, WORKERS, SHARD, ENGINE, TASKS, OPTION, QUIET, CHECK, WAIT, HELP };
+enum { OUT, SET, WORKERS, SHARD, ENGINE, TASKS, OPTION, QUIET, CHECK, HELP };
 
 static const struct word {
     const char *name;
@@ -45,11 +45,10 @@ static const struct word {
     {"--set", SET, ARGUMENTS_RUN | ARGUMENTS_SUBMIT, 1},
     {"--workers", WORKERS, ARGUMENTS_RUN | ARGUMENTS_SUBMIT, 1},
     {"--shard", SHARD, ARGUMENTS_RUN, 1},
-    {"--check", CHECK, ARGUMENTS_RUN | ARGUMENTS_SUBMIT, 0},
+    {"--check", CHECK, ARGUMENTS_RUN, 0},
     {"--engine", ENGINE, ARGUMENTS_SUBMIT, 1},
     {"--tasks", TASKS, ARGUMENTS_SUBMIT, 1},
     {"--option", OPTION, ARGUMENTS_SUBMIT, 1},
-    {"--wait", WAIT, ARGUMENTS_SUBMIT, 0},
     {"--quiet", QUIET, ARGUMENTS_RUN | ARGUMENTS_SUBMIT | ARGUMENTS_FOLDER, 0},
     {"--help", HELP, ARGUMENTS_RUN | ARGUMENTS_SUBMIT | ARGUMENTS_FOLDER, 0},
     {"-h", HELP, ARGUMENTS_RUN | ARGUMENTS_SUBMIT | ARGUMENTS_FOLDER, 0},
@@ -81,9 +80,6 @@ static mhe_status take(const struct word *word, const char *value, arguments *a,
         break;
     case CHECK:
         a->check = 1;
-        break;
-    case WAIT:
-        a->wait = 1;
         break;
     default:
         a->help = 1;

@@ -23,7 +23,7 @@ typedef struct arguments {
     int32_t n_tasks;
     const char **option; /* of the engine, lent as they stand */
     int32_t n_option;
-    int32_t quiet, check, wait, help;
+    int32_t quiet, check, help;
 } arguments;
 
 /* argv[2] and on. Give it back with arguments_free, also after a failure. */

@@ -5,6 +5,7 @@
 #include "report.h"
 #include "run.h"
 #include "study.h"
+#include "submit.h"
 
 #include <mhe/version.h>
 #include <stdio.h>
@@ -17,6 +18,8 @@ static const char help[] =
     "  mhe-study run STUDY.yaml [--out DIR] [--workers N] [--set path.to.key=value]... [--quiet]\n"
     "  mhe-study run --check STUDY.yaml [--set path.to.key=value]...\n"
     "  mhe-study report DIR [--quiet]\n"
+    "  mhe-study submit STUDY.yaml --engine slurm [--out DIR] [--tasks N] [--workers N]\n"
+    "      [--option WORD]... [--set path.to.key=value]...\n"
     "  mhe-study merge DIR [DIR]...\n"
     "  mhe-study --version | --help\n"
     "\n"
@@ -29,6 +32,8 @@ static const char help[] =
     "parts, in a process or on a machine of its own.\n"
     "report: statistics, figures and a page in DIR/report, as the study's section 'report' asks;\n"
     "it needs Debian's python3-pandas, python3-statsmodels and python3-matplotlib.\n"
+    "submit: the same study as a Slurm job array of N tasks (16), each with so many workers (1);\n"
+    "WORDs go to sbatch as they are: --option --partition=fast.\n"
     "merge: the tables of what DIR has, with the rows of other folders of the same study.\n"
     "'mhe-study run --help' shows every key of a study file.\n"
     "Exit status: 0 done; 1 failed, interrupted or incomplete; 2 the command line or an input is\n"
@@ -56,6 +61,7 @@ static const struct command {
     mhe_status (*help)(mhe_error *err);
 } commands[] = {{"run", ARGUMENTS_RUN, run_study, help_run},
                 {"report", ARGUMENTS_FOLDER, report_make, help_all},
+                {"submit", ARGUMENTS_SUBMIT, submit_study, help_all},
                 {"merge", ARGUMENTS_FOLDER, run_merge, help_all}};
 #define N_COMMANDS ((int32_t)(sizeof commands / sizeof commands[0]))
 

@@ -157,14 +157,19 @@ static mhe_status run_scripts(session *s, int quiet, mhe_error *err) {
 
 static mhe_status gather_all(session *s, mhe_error *err) {
     mhi_text text = {0};
+    int lock = -1;
     mhe_status status = s->rows.n > 0
-                            ? gather(&s->study, &s->rows, s->dir, err)
+                            ? session_lock(s, &lock, err)
                             : mhe_fail(err, MHE_E_INPUT, "%s: no trial was run yet", s->dir);
+    status = status == MHE_OK ? gather(&s->study, &s->rows, s->dir, err) : status;
     status = status == MHE_OK ? session_identity(s, &text, err) : status;
     if (status == MHE_OK) { /* what is shown may have changed since the study was run */
         status = identity_write(&s->study, s->dir, &text, err);
     }
     mhi_text_free(&text);
+    if (lock >= 0) {
+        (void)close(lock);
+    }
     if (status == MHE_OK && s->rows.n < s->study.n_trials) {
         char line[96];
         (void)snprintf(line, sizeof line, "%d of %d trials are missing",

@@ -8,6 +8,7 @@
 
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 /* Tasks of the shard that have no row yet. */
 static mhe_status missing_tasks(session *s, const arguments *a, task **tasks, int32_t *n,
@@ -50,10 +51,14 @@ static mhe_status tell(const session *s, mhe_error *err) {
     return status;
 }
 
-/* Tables, once no trial is missing. */
+/* Tables, once no trial is missing; shards that end together do it one after the other. */
 static mhe_status finish(session *s, const char *own, mhe_error *err) {
-    rows_free(&s->rows);
-    mhe_status status = rows_read(&s->study, s->dir, own, &s->rows, err);
+    int lock = -1;
+    mhe_status status = session_lock(s, &lock, err);
+    if (status == MHE_OK) {
+        rows_free(&s->rows);
+        status = rows_read(&s->study, s->dir, own, &s->rows, err);
+    }
     if (status == MHE_OK && s->rows.n == s->study.n_trials) {
         status = gather(&s->study, &s->rows, s->dir, err);
         status = status == MHE_OK ? tell(s, err) : status;
@@ -63,6 +68,9 @@ static mhe_status finish(session *s, const char *own, mhe_error *err) {
     } else if (status == MHE_OK) {
         (void)printf("%s: %d of %d trials; other shards have the rest\n", s->dir, (int)s->rows.n,
                      (int)s->study.n_trials);
+    }
+    if (lock >= 0) {
+        (void)close(lock);
     }
     return status;
 }
@@ -176,7 +184,12 @@ mhe_status run_merge(const arguments *a, const mhe_host *host, mhe_error *err) {
     if (status == MHE_OK && a->n_others > 0) {
         status = take_all(&s, a, err);
     }
+    int lock = -1;
+    status = status == MHE_OK ? session_lock(&s, &lock, err) : status;
     status = status == MHE_OK ? gather(&s.study, &s.rows, s.dir, err) : status;
+    if (lock >= 0) {
+        (void)close(lock);
+    }
     status = status == MHE_OK ? tell(&s, err) : status;
     if (status == MHE_OK && s.rows.n < s.study.n_trials) {
         status = mhe_fail(err, MHE_E_IO,

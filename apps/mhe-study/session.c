@@ -96,18 +96,23 @@ static mhe_status prepare_folder(session *s, int quiet, mhe_error *err) {
     return status;
 }
 
+/* Another shard may be making the motions: that takes its time. */
+mhe_status session_lock(session *s, int *lock, mhe_error *err) {
+    const char *path = mhi_arena_format(&s->arena, "%s/.lock", s->dir);
+    *lock = -1;
+    return path == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                        : take_lock(s, path, 100 * PATIENCE, lock, err);
+}
+
 mhe_status session_prepare(session *s, const char *out, int quiet, mhe_error *err) {
     s->dir = out == NULL ? mhi_arena_format(&s->arena, "out/%s", s->study.name)
                          : mhi_arena_text(&s->arena, out);
     const char *below = mhi_arena_format(&s->arena, "%s/rows", s->dir);
-    const char *path = mhi_arena_format(&s->arena, "%s/.lock", s->dir);
     int lock = -1;
-    mhe_status status = s->dir == NULL || below == NULL || path == NULL
+    mhe_status status = s->dir == NULL || below == NULL
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                             : make_folder(s->dir, err);
-    if (status == MHE_OK) { /* another shard may be making the motions: that takes its time */
-        status = take_lock(s, path, 100 * PATIENCE, &lock, err);
-    }
+    status = status == MHE_OK ? session_lock(s, &lock, err) : status;
     status = status == MHE_OK ? prepare_folder(s, quiet, err) : status;
     status = status == MHE_OK ? make_folder(below, err) : status;
     if (lock >= 0) {

@@ -33,6 +33,8 @@ mhe_status session_prepare(session *s, const char *out, int quiet, mhe_error *er
 mhe_status session_reopen(session *s, const char *dir, const mhe_host *host, mhe_error *err);
 /* Makes the shard ours and reads all rows. MHE_E_IO: another process has it. */
 mhe_status session_take_shard(session *s, const char *own, mhe_error *err);
+/* The folder's own lock, for what only one process may do at a time: close() the file *lock. */
+mhe_status session_lock(session *s, int *lock, mhe_error *err);
 /* The folder's identity with motions. */
 mhe_status session_identity(const session *s, mhi_text *text, mhe_error *err);
 void session_close(session *s);
