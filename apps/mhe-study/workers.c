@@ -138,60 +138,65 @@ static mhe_status start(crew *c, int32_t number, mhe_error *err) {
 }
 
 /* The trial that a worker died of, as a row. */
-static mhe_status record_crash(crew *c, int32_t number, int32_t at, int signal_number,
+static mhe_status record_crash(crew *c, int32_t number, int32_t at, const char *how,
                                mhe_error *err) {
     trial_result none = {.failed = 1};
-    mhi_text cells = {0}, timing = {0};
-    char reason[80];
+    mhi_text cells = {0}, timing = {0}, reason = {0};
     row_writer w;
-    (void)snprintf(reason, sizeof reason, "the trial ended its worker by signal %d (%s)",
-                   signal_number, strsignal(signal_number));
+    mhi_text_add(&reason, "the trial ended its worker by %s", how);
     trial_cells(&none, &cells);
     trial_timing(&none, &timing);
     mhe_status status = rows_open(c->setup->dir, c->setup->own, number, &w, err);
     if (status == MHE_OK) {
-        status = cells.failed || timing.failed
+        status = cells.failed || timing.failed || reason.failed
                      ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                     : append(&w, c->setup->tasks[at], cells.data, timing.data, reason, err);
+                     : append(&w, c->setup->tasks[at], cells.data, timing.data, reason.data, err);
     }
     mhe_error late = {0};
     const mhe_status closed = rows_close(&w, status == MHE_OK ? err : &late);
     mhi_text_free(&cells);
     mhi_text_free(&timing);
+    mhi_text_free(&reason);
     atomic_fetch_add(&c->board->done, 1);
     atomic_fetch_add(&c->board->failed, 1);
     return status == MHE_OK ? closed : status;
 }
 
-/* Somebody's kill, the machine's lack of memory included, is no property of the trial. */
-static int is_from_outside(int signal_number) {
-    return signal_number == SIGKILL || signal_number == SIGTERM || signal_number == SIGHUP;
-}
-
-static mhe_status after_death(crew *c, int32_t number, int signal_number, mhe_error *err) {
+/* Makes a new worker of one that died `how`; what kills it from outside, the machine's lack of
+ * memory included, is no property of its trial. */
+static mhe_status after_death(crew *c, int32_t number, const char *how, int32_t from_outside,
+                              mhe_error *err) {
     const int32_t at = atomic_load(&c->board->desks[number].task);
-    const int32_t same = at >= 0 && at == c->again[number];
     mhe_status status = MHE_OK;
-    c->attempts[number] = same ? c->attempts[number] + 1 : 1;
+    c->attempts[number] = at == c->again[number] ? c->attempts[number] + 1 : 1;
     c->again[number] = at;
-    if (at >= 0 && (!is_from_outside(signal_number) || c->attempts[number] >= ATTEMPTS_MAX)) {
-        status = record_crash(c, number, at, signal_number, err);
+    const int32_t often = c->attempts[number] >= ATTEMPTS_MAX;
+    if (at < 0 && often) {
+        return mhe_fail(err, MHE_E_IO, "a worker is ended again and again by %s", how);
+    }
+    if (at >= 0 && (!from_outside || often)) {
+        status = record_crash(c, number, at, how, err);
         c->again[number] = -1;
+        c->attempts[number] = 0;
     }
     return status == MHE_OK && !c->board->stop ? start(c, number, err) : status;
 }
 
 static mhe_status judge(crew *c, int32_t number, int how, mhe_error *err) {
+    const mhe_error *why = &c->board->desks[number].error;
+    char text[80];
     c->pids[number] = 0;
     if (WIFSIGNALED(how)) {
-        return after_death(c, number, WTERMSIG(how), err);
+        const int by = WTERMSIG(how);
+        (void)snprintf(text, sizeof text, "signal %d (%s)", by, strsignal(by));
+        return after_death(c, number, text, by == SIGKILL || by == SIGTERM || by == SIGHUP, err);
     }
     if (WEXITSTATUS(how) == 0) {
         return MHE_OK;
     }
-    const mhe_error *why = &c->board->desks[number].error;
-    if (why->text[0] == '\0') {
-        return mhe_fail(err, MHE_E_IO, "a worker ended with exit status %d", WEXITSTATUS(how));
+    if (why->text[0] == '\0') { /* a library called exit() */
+        (void)snprintf(text, sizeof text, "exit status %d", WEXITSTATUS(how));
+        return after_death(c, number, text, 0, err);
     }
     *err = *why;
     return why->code != MHE_OK ? why->code : MHE_E_IO;

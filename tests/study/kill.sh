@@ -28,6 +28,11 @@ kills=0 folder=0
 while [ $kills -lt 20 ]; do
     "$study" run small.yaml --out "killed$folder" --quiet > out.txt 2> err.txt &
     pid=$!
+    before=$(rows "killed$folder")
+    for _ in $(seq $((RANDOM % 2 * 200))); do # half of them once there is something new
+        [ "$(rows "killed$folder")" -eq "$before" ] && kill -0 $pid 2> /dev/null || break
+        sleep 0.1
+    done
     sleep "0.$(printf %03d $((RANDOM % 800 + 50)))"
     if kill -9 $pid 2> /dev/null; then
         wait $pid 2> /dev/null
@@ -57,7 +62,9 @@ for _ in $(seq 100); do
     [ "$(rows worker)" -ge 2 ] && break
     sleep 0.1
 done
-worker=$(ps -o pid= --ppid $pid | head -n 1)
+worker=$(ps -o pid= --ppid $pid | sort -n | head -n 1)
+[ -n "$worker" ] && kill -STOP "$worker"
+printf '0123456789abcdef\t0\t1\tok' >> "$(find worker/rows -name '*-0.rows')" # killed in the middle of a line
 [ -n "$worker" ] && kill -9 "$worker" || fail "no worker to kill"
 wait $pid || fail "a killed worker stops the run: $(cat err.txt)"
 cmp calm/results.csv worker/results.csv || fail "a killed worker changes results"
@@ -72,7 +79,7 @@ done
 worker=$(ps -o pid= --ppid $pid | head -n 1)
 [ -n "$worker" ] && kill -SEGV "$worker" || fail "no worker to crash"
 wait $pid || fail "a crash stops the run: $(cat err.txt)"
-[ "$(grep -c 'ended its worker by signal 11' crash/results.csv)" -eq 1 ] || fail "the crash is no row"
+[ "$(grep -cE 'ended its worker by (signal 11|exit status)' crash/results.csv)" -eq 1 ] || fail "the crash is no row"
 
 # Ctrl-C: exit status 1, the line says how to go on, no tables yet.
 "$study" run small.yaml --out cut --quiet > out.txt 2> err.txt &
