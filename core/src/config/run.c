@@ -6,11 +6,9 @@
 #include "config/options_value.h"
 #include "config/run_sections.h"
 
-#include <errno.h>
 #include <mhe/model.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 /* What of the file is read; other sections belong to another program. */
 enum { SCOPE_ALL, SCOPE_MODEL, SCOPE_STEPS };
@@ -28,77 +26,6 @@ static mhe_status no_memory(const struct reader *r) {
 
 static mhi_node *section_node(const mhi_run *run, const char *name) {
     return mhi_node_find(mhi_tree_root(run->tree), name);
-}
-
-/* ---- the file, its name and the assignments from the command line ---- */
-
-/* "solver: ID" is short for "solver: {plugin: ID}". */
-static mhe_status expand_short_forms(const struct reader *r) {
-    int32_t n = 0;
-    const mhi_section *sections = mhi_run_sections(&n);
-    mhe_status status = MHE_OK;
-    for (int32_t i = 0; i < n && status == MHE_OK; i++) {
-        mhi_node *node = section_node(r->run, sections[i].name);
-        if (node == NULL || sections[i].iface == NULL) {
-            continue;
-        }
-        if (strcmp(sections[i].iface, MHE_COST_IFACE) != 0) {
-            status = mhi_node_expand(r->run->tree, node, "plugin", r->err);
-            continue;
-        }
-        for (mhi_node *cost = node->kind == MHI_SEQUENCE ? node->first : NULL;
-             cost != NULL && status == MHE_OK; cost = cost->next) {
-            status = mhi_node_expand(r->run->tree, cost, "plugin", r->err);
-        }
-    }
-    return status;
-}
-
-/* The folder is made absolute, so that a resolved configuration holds wherever it is read. */
-static mhe_status name_run(const struct reader *r, const char *path) {
-    mhi_run *run = r->run;
-    const char *slash = strrchr(path, '/');
-    const char *base = slash == NULL ? path : slash + 1;
-    const char *dot = strrchr(base, '.');
-    size_t n_folder = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
-    run->path = mhi_arena_text(&run->arena, path);
-    run->name = mhi_arena_text_n(&run->arena, base,
-                                 dot == NULL || dot == base ? strlen(base) : (size_t)(dot - base));
-    if (path[0] == '/') {
-        run->dir = mhi_arena_text_n(&run->arena, path, n_folder);
-    } else {
-        char here[4096];
-        if (getcwd(here, sizeof here) == NULL) {
-            return mhe_fail(r->err, MHE_E_INPUT, "the working directory is not known: %s",
-                            strerror(errno));
-        }
-        run->dir = n_folder == 0
-                       ? mhi_arena_text(&run->arena, here)
-                       : mhi_arena_format(&run->arena, "%s/%.*s", here, (int)n_folder, path);
-    }
-    return run->path == NULL || run->name == NULL || run->dir == NULL ? no_memory(r) : MHE_OK;
-}
-
-static mhe_status read_tree(const struct reader *r, const char *path, const char *const *set,
-                            int32_t n_set) {
-    mhe_status status = mhi_tree_read(path, &r->run->tree, r->err);
-    if (status == MHE_OK) {
-        status = name_run(r, path);
-    }
-    if (status == MHE_OK && mhi_tree_root(r->run->tree)->kind != MHI_MAPPING) {
-        status = mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, mhi_tree_root(r->run->tree),
-                             "a configuration is a mapping of sections (model, costs, ...)");
-    }
-    if (status == MHE_OK) {
-        status = expand_short_forms(r);
-    }
-    for (int32_t i = 0; i < n_set && status == MHE_OK; i++) {
-        status = mhi_tree_set(r->run->tree, set[i], r->err);
-        if (status == MHE_OK) {
-            status = expand_short_forms(r);
-        }
-    }
-    return status;
 }
 
 /* ---- sections without a plugin ---- */
@@ -362,7 +289,7 @@ static mhe_status read_run(const char *path, const char *const *set, int32_t n_s
     if (run == NULL) {
         return no_memory(&reader);
     }
-    mhe_status status = read_tree(&reader, path, set, n_set);
+    mhe_status status = mhi_run_read_tree(run, path, set, n_set, err);
     if (scope == SCOPE_MODEL) {
         status = status == MHE_OK ? read_plugin_sections(&reader, MHE_MODEL_IFACE) : status;
     } else {
