@@ -3,21 +3,14 @@
 
 #include "diagnosis.h"
 #include "estimator/create.h"
+#include "interrupt.h"
 #include "picture.h"
 #include "progress.h"
 #include "report.h"
 #include "results.h"
 #include "summary.h"
 
-#include <signal.h>
 #include <string.h>
-
-static volatile sig_atomic_t interrupted;
-
-static void on_interrupt(int signal_number) {
-    (void)signal_number;
-    interrupted = 1;
-}
 
 typedef struct tracking {
     const track_setup *setup;
@@ -104,7 +97,7 @@ static mhe_status estimate_frame(tracking *t, int32_t k, mhe_error *err) {
         }
         status = take_estimate(t, &estimate, err);
     }
-    t->summary.n_pushed++;
+    t->summary.n_pushed += status == MHE_OK;
     return status;
 }
 
@@ -117,16 +110,19 @@ static void show(progress *bar, int32_t done, const tally *t) {
 
 static mhe_status estimate_all(tracking *t, mhe_error *err) {
     const int32_t n = t->recording->n_frames;
+    const atomic_int *stop = interrupt_asked();
     progress bar;
     progress_start(&bar, n, 0, t->setup->quiet);
+    mhi_estimator_set_stop(t->estimator, stop);
     mhe_status status = MHE_OK;
-    for (int32_t k = 0; k < n && status == MHE_OK && !interrupted; k++) {
+    for (int32_t k = 0; k < n && status == MHE_OK && !*stop; k++) {
         if (t->setup->realtime) {
             k = live_wait(&t->live, t->estimator, t->recording->time, n);
         }
-        status = interrupted ? MHE_OK : estimate_frame(t, k, err);
+        status = *stop ? MHE_OK : estimate_frame(t, k, err);
         show(&bar, k + 1, &t->summary.tally);
     }
+    status = status == MHE_E_INTERRUPTED ? MHE_OK : status; /* finish() tells */
     t->summary.elapsed = progress_elapsed(&bar);
     progress_end(&bar);
     live_end(&t->live);
@@ -193,6 +189,7 @@ static mhe_status finish(tracking *t, mhe_error *err) {
     if (status == MHE_OK) {
         status = mhi_outbox_commit(t->outbox, err);
     }
+    interrupt_end();
     if (status != MHE_OK) {
         return status;
     }
@@ -203,7 +200,7 @@ static mhe_status finish(tracking *t, mhe_error *err) {
                             "no solve converged; quality.sto says how each ended");
     }
     tell(t);
-    if (interrupted) {
+    if (*interrupt_asked()) {
         return mhe_fail(
             err, MHE_E_INTERRUPTED,
             "interrupted after %d of %d frames; the files hold what was estimated until then",
@@ -219,20 +216,15 @@ static mhe_status finish(tracking *t, mhe_error *err) {
 
 mhe_status track(const track_setup *setup, mhe_error *err) {
     tracking t = {.setup = setup};
-    struct sigaction action, before[2];
-    memset(&action, 0, sizeof action);
-    action.sa_handler = on_interrupt;
-    action.sa_flags = (int)SA_RESETHAND; /* a second one ends the program at once */
     mhe_status status = open_all(&t, err);
     if (status == MHE_OK && !setup->check_only) {
-        (void)sigaction(SIGINT, &action, &before[0]);
-        (void)sigaction(SIGTERM, &action, &before[1]);
+        interrupt_begin(t.outbox);
         status = estimate_all(&t, err);
+        interrupt_settle();
         if (status == MHE_OK) {
             status = finish(&t, err);
         }
-        (void)sigaction(SIGINT, &before[0], NULL);
-        (void)sigaction(SIGTERM, &before[1], NULL);
+        interrupt_end();
     }
     results_close(t.results);
     mhi_outbox_close(t.outbox);

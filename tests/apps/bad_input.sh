@@ -102,6 +102,10 @@ edit demo_markers.trc '20s/$/\t1\t2\t3\t4/'
 expect too-many-cells 'demo_markers.trc:20'
 edit demo_markers.trc '20s/\t[0-9.-]*$/\tabc/'
 expect no-number 'demo_markers.trc:20'
+awk -F '\t' -v OFS='\t' 'NR == 3 {$1 = 0.1} NR > 6 {$2 *= 1000} 1' "$demo"/demo_markers.trc > demo_markers.trc
+expect markers-in-ms 'demo_markers.trc:8: rows are 10 s apart (0.1 Hz): are its times in ms instead of s?'
+awk -F '\t' -v OFS='\t' 'NR > 6 {$2 *= 1000} 1' "$demo"/demo_markers.trc > demo_markers.trc
+warn markers-in-ms-by-the-header 'the header says 100 Hz, the times 0.1 Hz: they are taken as ms'
 edit demo_markers.trc '12,$d'
 expect too-few-frames 'too few'
 : > demo_markers.trc
@@ -117,6 +121,12 @@ head -c 4000 /dev/urandom > demo_emg.sto
 expect random-bytes 'demo_emg.sto'
 awk -F '\t' -v OFS='\t' 'NR > 7 {$1 *= 1000} 1' "$demo"/demo_emg.sto > demo_emg.sto
 expect emg-in-ms 'are its times in ms instead of s?'
+awk -F '\t' -v OFS='\t' 'NR > 7 {$1 *= 1000} 1' "$demo"/demo_emg.sto > demo_emg.sto
+sed 's/markers: demo_markers.trc, //' "$demo"/demo.yaml > demo.yaml
+expect emg-alone-in-ms 'are its times in ms instead of s?'
+awk 'BEGIN {print "endheader\ntime\tArm_RotX"; for (k = 0; k < 50; k++) print 10 * k "\t0.1"}' > angles.mot
+sed 's/markers: demo_markers.trc, emg: demo_emg.sto/angles: angles.mot/' "$demo"/demo.yaml > demo.yaml
+expect angles-in-ms 'angles.mot:4: rows are 10 s apart'
 expect emg-elsewhere 'no time in common' demo.yaml --set data.emg_offset=100
 head -c 3000 /dev/urandom > demo.c3d
 expect c3d-random-bytes 'demo.c3d' demo.yaml --set data.markers=demo.c3d

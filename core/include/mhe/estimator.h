@@ -113,8 +113,8 @@ mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *err);
  * window's first fill on, at every ratio-th frame. A bad frame or a failed solve is told by
  * estimate->status. MHE_E_ARGUMENT: time does not increase (or only less than a window back: then
  * the frame is out of order); the frame is not taken. MHE_E_INPUT: no marker of the first window is
- * within a metre of the model; the window moves on and the next frame is tried. Anything else is a
- * bug. [cold] */
+ * within a metre of the model, or the frames are half a second or more apart (times in ms?); the
+ * window moves on and the next frame is tried. Anything else is a bug. [cold] */
 mhe_status mhe_estimator_push(mhe_estimator *estimator, const mhe_frame *frame,
                               mhe_estimate *estimate, int32_t *ready, mhe_error *err);
 

@@ -8,6 +8,7 @@
  * back by more than a window, the window is emptied and begins anew; until it is full there is no
  * estimate, as at the start of a run. */
 #include "estimator/estimator_private.h"
+#include "estimator/recording.h"
 
 #include <stdlib.h>
 
@@ -67,27 +68,36 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-int32_t mhi_clock_measure(mhe_estimator *e) {
+mhe_status mhi_clock_measure(mhe_estimator *e, int32_t *known, mhe_error *err) {
     int32_t n_gaps = 0, last_gap = 0;
     for (int32_t k = 0; k < e->n; k++) {
         e->steps[k] = e->times[k + 1] - e->times[k];
     }
     qsort(e->steps, (size_t)e->n, sizeof *e->steps, by_value);
-    const double median = e->steps[e->n / 2];
+    const double median = e->steps[e->n / 2], mean = (e->times[e->n] - e->times[0]) / e->n;
+    const double longest = e->run->horizon.ratio / MHI_SLOWEST;
+    *known = 0;
+    if (median >= longest) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "frames come %.6g s apart: are their times in ms instead of s?",
+                        median / e->run->horizon.ratio);
+    }
     for (int32_t k = 0; k < e->n; k++) {
         if (e->times[k + 1] - e->times[k] > GAP * median) {
             n_gaps++;
             last_gap = k;
         }
     }
-    if (n_gaps == 1) { /* several: uneven times, taken as even */
+    if (n_gaps == 1 ||
+        (n_gaps > 1 && mean >= longest)) { /* several short ones: uneven times, taken as even */
         for (int32_t k = 0; k <= last_gap; k++) {
             mhi_window_advance(e);
         }
-        return 0;
+        return MHE_OK;
     }
-    e->interval = (e->times[e->n] - e->times[0]) / e->n;
+    e->interval = mean;
     e->grid = e->times[e->n];
     mhi_ocp_set_interval(e->ocp, e->interval);
-    return 1;
+    *known = 1;
+    return MHE_OK;
 }

@@ -34,6 +34,9 @@ void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
 void mhi_estimator_set_node(mhe_estimator *estimator, int32_t node); /* output.node */
 void mhi_estimator_set_deadline(mhe_estimator *estimator, double seconds);
 void mhi_estimator_set_outlier(mhe_estimator *estimator, double distance);
+/* While *stop is not 0 every push that would solve ends at once without an estimate, one in work
+ * too: MHE_E_INTERRUPTED. Lent; may be set by a signal handler. */
+void mhi_estimator_set_stop(mhe_estimator *estimator, const atomic_int *stop);
 /* After a push that was `ready`: node k of that window, 1 .. N, as an estimate: time, states,
  * controls and what follows from them. The last node has the controls that lead to it. */
 mhe_status mhi_estimator_node(mhe_estimator *estimator, int32_t k, mhe_estimate *estimate,

@@ -296,6 +296,11 @@ void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {
     e->budget = seconds;
 }
 
+void mhi_estimator_set_stop(mhe_estimator *e, const atomic_int *stop) {
+    e->stop = stop;
+    mhi_ocp_set_stop(e->ocp, stop);
+}
+
 void mhi_estimator_set_outlier(mhe_estimator *e, double distance) {
     e->outlier = distance;
 }

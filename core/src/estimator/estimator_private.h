@@ -71,7 +71,8 @@ struct mhe_estimator {
     double ahead;   /* spent by mhe_estimator_prepare on the next estimate */
     double per_iteration;
 
-    int32_t failure_told; /* the host knows that the solver gave an error */
+    const atomic_int *stop; /* by a signal; NULL: never */
+    int32_t failure_told;   /* the host knows that the solver gave an error */
     mhe_solution solution;
     double *guess_x, *guess_u;           /* what the last solve started from */
     double *prior_centre, *prior_weight; /* [n_x], of an unsettled window's proximal term */
@@ -97,9 +98,9 @@ mhe_status mhi_estimator_limits(mhe_estimator *e, mhe_error *err);
 /* clock.c. Is this frame to be used? Missing nodes before it are put in. MHE_E_ARGUMENT: its time
  * does not follow the last one's. */
 mhe_status mhi_clock_take(mhe_estimator *e, double time, int32_t *used, mhe_error *err);
-/* Learns the interval from the full window. 0: there is a gap in it; what lies before is dropped.
- */
-int32_t mhi_clock_measure(mhe_estimator *e);
+/* Learns the interval from the full window. `*known` 0: there is a gap in it; what lies before is
+ * dropped. MHE_E_INPUT: the frames come too seldom for seconds (MHI_SLOWEST). */
+mhe_status mhi_clock_measure(mhe_estimator *e, int32_t *known, mhe_error *err);
 
 /* window.c */
 void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg,
@@ -119,8 +120,9 @@ void mhi_window_advance(mhe_estimator *e);
  * the model at all; nothing is changed. */
 mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err);
 
-/* solve.c: solves; the outcome as MHE_FRAME_*. */
-void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status);
+/* solve.c: solves; the outcome as MHE_FRAME_*. MHE_E_INTERRUPTED: told to stop, no outcome. */
+mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
+                            mhe_error *err);
 
 /* recover.c */
 void mhi_recover_screen(mhe_estimator *e); /* the newest frame against what is expected */

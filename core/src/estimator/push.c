@@ -95,8 +95,8 @@ static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err)
             (void)mhi_window_begin(e, NULL); /* where it cannot, the old start goes on */
         }
     } else {
-        *known = e->interval > 0 || mhi_clock_measure(e);
-        status = *known ? mhi_window_begin(e, err) : MHE_OK;
+        status = e->interval > 0 ? MHE_OK : mhi_clock_measure(e, known, err);
+        status = status == MHE_OK && *known ? mhi_window_begin(e, err) : status;
     }
     if (status == MHE_OK && *known) {
         mhi_window_set_targets(e);
@@ -132,7 +132,9 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
         return MHE_OK;
     }
     if (status == MHE_OK) {
-        mhi_window_solve(e, &info, &estimate->status);
+        status = mhi_window_solve(e, &info, &estimate->status, err);
+    }
+    if (status == MHE_OK) {
         mhi_recover_solved(e, estimate->status);
         status = give_estimate(e, e->node, estimate, err);
         estimate->latency = mhi_now() - e->arrival;

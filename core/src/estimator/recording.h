@@ -11,6 +11,10 @@
 #include <mhe/estimator.h>
 #include <mhe/host.h>
 
+/* Hz: more seldom no motion is recorded, but one of up to 2000 Hz is, its times taken as s being
+ * ms. */
+#define MHI_SLOWEST 2.0
+
 /* What is known of the truth, on the frames' times. NaN where a column is absent. */
 typedef struct mhi_reference {
     int32_t present;

@@ -145,11 +145,15 @@ static int32_t status_of(const mhe_estimator *e, int32_t outcome) {
     }
 }
 
-void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status) {
+mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
+                            mhe_error *err) {
     mhe_error why = {0};
     memcpy(e->guess_x, e->solution.x, sizeof(double) * (size_t)(e->n + 1) * (size_t)e->n_x);
     memcpy(e->guess_u, e->solution.u, sizeof(double) * (size_t)e->n * (size_t)e->n_u);
     const mhe_status status = (e->settled ? solve_once : settle)(e, info, &why);
+    if (e->stop != NULL && atomic_load_explicit(e->stop, memory_order_relaxed)) {
+        return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted");
+    }
     if (status != MHE_OK) {
         tell_failure(e, why.text);
     }
@@ -165,4 +169,5 @@ void mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_sta
         take_back_guess(e);
     }
     e->solved++;
+    return MHE_OK;
 }

@@ -166,6 +166,13 @@ mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err) {
     return MHE_OK;
 }
 
+void mhi_outbox_abandon(const mhi_outbox *outbox) {
+    const mhi_outbox_file *file = outbox == NULL ? NULL : outbox->files;
+    for (; file != NULL; file = file->next) {
+        (void)unlink(file->temporary);
+    }
+}
+
 void mhi_outbox_close(mhi_outbox *outbox) {
     if (outbox == NULL) {
         return;

@@ -15,6 +15,9 @@ mhe_status mhi_outbox_open(const char *dir, mhi_outbox **outbox, mhe_error *err)
 mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err);
 /* Frees; without a commit before, the temporary files are removed. */
 void mhi_outbox_close(mhi_outbox *outbox);
+/* Removes the temporary files of an outbox that will not be closed, because the program ends here
+ * and now: all that a signal handler may do. NULL is fine. */
+void mhi_outbox_abandon(const mhi_outbox *outbox);
 /* A whole text file. */
 mhe_status mhi_outbox_text(mhi_outbox *outbox, const char *name, const char *text, mhe_error *err);
 

@@ -8,6 +8,7 @@
 /* Rows of numbers under labels, time first. Missing values are NaN. Owned by whoever read it. */
 typedef struct mhi_table {
     char *path;                /* for messages */
+    int32_t line;              /* of the file, where the first row stands; 0: it has no lines */
     int32_t n_rows, n_columns; /* columns without time */
     int32_t n_labels;          /* n_columns; in a .trc n_columns / 3 */
     char **labels;             /* [n_labels], no two the same */

@@ -142,6 +142,7 @@ mhe_status mhi_table_row(mhi_table_reader *reader, int32_t first) {
     for (int32_t i = 0; i < table->n_columns && status == MHE_OK; i++) {
         status = take_value(reader, i, reader->cells[first + 1 + i], &row[i]);
     }
+    table->line = table->n_rows == 0 ? reader->line_number : table->line;
     table->n_rows += status == MHE_OK;
     mhi_table_give_back(reader);
     return status;

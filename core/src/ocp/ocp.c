@@ -132,6 +132,9 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
                             mhe_error *err) {
     const mhi_ocp *ocp = problem->data;
     mhi_ocp_worker *w = &ocp->workers[worker_index];
+    if (ocp->stop != NULL && atomic_load_explicit(ocp->stop, memory_order_relaxed)) {
+        return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted");
+    }
     if (!all_finite(x, problem->n_x) || (u != NULL && !all_finite(u, problem->n_u))) {
         return mhe_fail(err, MHE_RETRY, "a state or control is not finite");
     }
@@ -223,6 +226,10 @@ void mhi_ocp_forget(mhi_ocp *ocp) {
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight) {
     memcpy(ocp->prior_centre, centre, sizeof(double) * (size_t)ocp->face.n_x);
     memcpy(ocp->prior_weight, weight, sizeof(double) * (size_t)ocp->face.n_x);
+}
+
+void mhi_ocp_set_stop(mhi_ocp *ocp, const atomic_int *stop) {
+    ocp->stop = stop;
 }
 
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {

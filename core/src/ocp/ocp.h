@@ -14,6 +14,7 @@
 
 #include <mhe/integrator.h>
 #include <mhe/solver.h>
+#include <stdatomic.h>
 
 typedef struct mhi_ocp_setup {
     const mhe_host *host;
@@ -51,6 +52,9 @@ void mhi_ocp_shift(mhi_ocp *ocp);
 void mhi_ocp_forget(mhi_ocp *ocp);
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval);    /* s, of all intervals */
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time); /* s, told to costs */
+/* While *stop is not 0 no stage is evaluated (MHE_E_INTERRUPTED), so that a solve ends at once.
+ * Lent; NULL (as at the start): never. */
+void mhi_ocp_set_stop(mhi_ocp *ocp, const atomic_int *stop);
 
 /* Adds 1/2 sum_i weight_i (x_i - centre_i)^2 to node 0; both [n_x], copied. All weights 0 (as at
  * the start): none. */

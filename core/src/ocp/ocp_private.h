@@ -26,6 +26,7 @@ struct mhi_ocp {
     int32_t n_terms, n_terms_created, n_workers_created;
     uint32_t wanted; /* signals any term reads */
     double interval;
+    const atomic_int *stop; /* NULL: never */
     double *x_lower, *x_upper, *u_lower, *u_upper;
     double *targets;                     /* [(N+1) x n_y] */
     double *times;                       /* [N+1] */

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* interrupt.h: Ctrl-C and SIGTERM end a run within a moment, whatever it is busy with.
+ *
+ * The first asks: the solve in work ends at its next evaluation, and what was estimated until then
+ * is written. A plugin that never comes back is left after INTERRUPT_GRACE seconds, or at once by a
+ * second signal: the program then ends with status 1 and without a file. */
+#ifndef INTERRUPT_H
+#define INTERRUPT_H
+
+#include "io/sink.h"
+
+#include <stdatomic.h>
+
+#define INTERRUPT_GRACE 2 /* s */
+
+/* From here on signals ask. `outbox` is lent, its files do not change until interrupt_settle. */
+void interrupt_begin(const mhi_outbox *outbox);
+/* Not 0: asked to end. */
+const atomic_int *interrupt_asked(void);
+/* The frames are done, the files are being written: this is brief and is not broken off, but by a
+ * second signal. */
+void interrupt_settle(void);
+/* Signals do what they did before interrupt_begin. */
+void interrupt_end(void);
+
+#endif

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* recording_private.h: what the readers of the recording's files share (recording_table.c). */
+#ifndef MHI_RECORDING_PRIVATE_H
+#define MHI_RECORDING_PRIVATE_H
+
+#include "estimator/columns.h"
+#include "estimator/recording.h"
+
+/* Passes the reader's warnings on. MHE_E_INPUT: the rows come so seldom that their times must be in
+ * ms; taken as seconds, a window would last minutes. [cold] */
+mhe_status mhi_recording_check_table(const mhi_table *table, const mhe_host *host, mhe_error *err);
+
+/* The model's names of coordinates ('q'), muscles ('m') or markers ('k') [n] in one list; freed by
+ * the caller, NULL without memory. [cold] */
+const char **mhi_recording_names(const mhe_description *d, int kind, int32_t n);
+
+/* The rows' times become the frames'. [cold] */
+mhe_status mhi_recording_set_times(mhi_recording *r, const mhi_table *table, mhe_error *err);
+/* The estimator takes the first window's mean step for all; says where the steps differ. [cold] */
+void mhi_recording_warn_uneven(const mhi_recording *r, const char *path, const mhe_host *host);
+
+/* One quantity of `n` names, `width` columns each, from a table onto the recording's times:
+ * out [n_frames x n width], taken here. [cold] */
+mhe_status mhi_recording_columns(const mhi_recording *r, const mhi_table *table,
+                                 const mhi_naming *naming, const char *const *names, int32_t n,
+                                 int32_t width, int32_t hold, double **out, int32_t *n_found,
+                                 const mhe_host *host, mhe_error *err);
+
+/* recording_emg.c: run->data.emg onto the frames' times; without any, its own become the frames',
+ * or of electrodes a grid at emg.rate. [cold] */
+mhe_status mhi_recording_read_emg(mhi_recording *r, const mhi_run *run, const mhe_description *d,
+                                  const mhe_host *host, mhe_error *err);
+
+#endif

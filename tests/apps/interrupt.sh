@@ -1,0 +1,58 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# SIGTERM ends mhe-run whatever it is busy with, and leaves whole files or none. No time is judged: a run that does not
+# end is ended by `timeout`, whose status tells.
+#   interrupt.sh PATH/mhe-run FOLDER_OF_HANGING_COST SOURCE_DIR
+set -u
+run=$1
+hanging=$2
+demo=$3/models/arm19/demo.yaml
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+cd "$work" || exit 1
+failed=0
+
+fail() {
+    echo "FAILED $*"
+    failed=$((failed + 1))
+}
+
+# interrupted FOLDER [arguments]: SIGTERM once the results are begun -> status, err.txt
+interrupted() {
+    folder=$1
+    shift
+    timeout -s KILL 60 "$run" "$demo" --quiet --out "$folder" --set output.picture=false "$@" > out.txt 2> err.txt &
+    pid=$!
+    until [ -e "$folder/.quality.sto.tmp" ] || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
+    sleep 1
+    kill -TERM $pid # timeout hands it on
+    wait $pid
+    status=$?
+}
+
+# ended FOLDER 'TEXT' FILES: what there is afterwards
+ended() {
+    [ "$status" -eq 1 ] || fail "$1: exit status $status: $(cat err.txt)"
+    grep -qF -- "$2" err.txt || fail "$1: '$2' is not in: $(cat err.txt)"
+    [ -z "$(find "$1" -name '*.tmp')" ] || fail "$1: temporary files are left"
+    [ "$(find "$1" -type f | wc -l)" -ge "$3" ] || fail "$1: files are missing"
+    [ "$3" -gt 0 ] || [ -z "$(find "$1" -type f)" ] || fail "$1: there are files: $(ls "$1")"
+}
+
+# Between two frames: what was estimated until then is there, complete.
+interrupted live --realtime
+ended live 'interrupted after' 9
+rows=$(sed -n 's/^nRows=//p' live/estimates.sto)
+[ "$(sed '1,/endheader/d' live/estimates.sto | tail -n +2 | wc -l)" -eq "$rows" ] || fail "estimates.sto is not whole"
+
+# In a solve that takes long: 7 intervals of 10 000 steps, iteration by iteration.
+interrupted slow --set integrator.max_step=3e-6
+ended slow 'interrupted' 0
+
+# In a plugin that never comes back.
+MHE_PLUGIN_PATH=$MHE_PLUGIN_PATH:$hanging
+interrupted hanging --set 'costs=[test.cost.hanging]'
+ended hanging 'nothing is written' 0
+
+[ "$failed" -eq 0 ] && echo ok
+[ "$failed" -eq 0 ]
