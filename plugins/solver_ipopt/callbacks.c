@@ -90,6 +90,16 @@ static compat_bool eval_h(compat_index n, compat_number *v, compat_bool new_x,
     return 1;
 }
 
+/* Would another iteration, as long as those before, end behind the deadline? */
+static int32_t is_late(ipopt_solver *s) {
+    const double now = nlp_now();
+    if (s->iterations == 0) {
+        s->begun = now;
+    }
+    const double one = s->iterations > 0 ? (now - s->begun) / s->iterations : 0;
+    return now + one >= s->control->deadline;
+}
+
 static compat_bool intermediate(compat_index mode, compat_index iteration, compat_number objective,
                                 compat_number inf_pr, compat_number inf_du, compat_number mu,
                                 compat_number d_norm, compat_number regularization,
@@ -105,7 +115,7 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
     if (control != NULL && control->progress != NULL &&
         control->progress(control->data, iteration, objective, s->kkt_residual)) {
         s->stopped = MHE_SOLVE_INTERRUPTED;
-    } else if (control != NULL && control->deadline > 0 && nlp_now() >= control->deadline) {
+    } else if (control != NULL && control->deadline > 0 && is_late(s)) {
         s->stopped = MHE_SOLVE_DEADLINE;
     }
     return s->stopped == 0 && s->nlp.failure == MHE_OK;

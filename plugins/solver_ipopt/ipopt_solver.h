@@ -47,6 +47,7 @@ typedef struct ipopt_solver {
     const mhe_solve_control *control; /* of the running solve */
     int32_t stopped;                  /* MHE_SOLVE_DEADLINE or _INTERRUPTED once asked to; else 0 */
     int32_t iterations;
+    double begun;        /* s of CLOCK_MONOTONIC, of the first iteration */
     double kkt_residual; /* scaled primal and dual infeasibility of the last iterate */
 } ipopt_solver;
 

@@ -337,6 +337,10 @@ int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t
             result = QP_SOLVED;
             break;
         }
+        if (limits->is_late != NULL && limits->is_late(limits->data)) {
+            result = QP_LATE;
+            break;
+        }
         q->softness = fmin(q->softness, softness(q, barrier));
         if (!isfinite(q->stationarity + q->feasibility + barrier) || !factorise(q)) {
             result = QP_FAILED;

@@ -16,12 +16,15 @@ typedef struct qp_limits { /* largest residuals of a solved program */
     double stationarity, feasibility, complementarity;
     int32_t max_iterations;
     double regularisation;
+    int32_t (*is_late)(const void *data); /* asked before each iteration; NULL: never */
+    const void *data;
 } qp_limits;
 
 #define QP_SOLVED 0
 #define QP_LIMIT 1      /* iterations are used up */
 #define QP_INFEASIBLE 2 /* ... and bounds are violated: w violates them least */
 #define QP_FAILED 3     /* a Newton system could not be solved */
+#define QP_LATE 4       /* is_late() said so: the iterate so far */
 
 /* One side of a bound: sign * (w[at] - bound) >= 0, or = 0 with slack 0. */
 typedef struct qp_side {

@@ -49,6 +49,7 @@ typedef struct rti_leap {
     int32_t taken;
     int32_t solved;   /* the program was, to its tolerance */
     double length;    /* part of its step */
+    double left;      /* largest gap at the result, by the linearisation */
     double front;     /* its longest component among those of u_0 and x_1 */
     double first_gap; /* largest |x_1 - F_0| at the result */
     double cost;      /* scaled, of the quadratic model at the result */
@@ -117,8 +118,10 @@ void rti_measure(rti_solver *s);
 #define RTI_STUCK 1      /* no step helps */
 #define RTI_INFEASIBLE 2 /* ... towards the bounds and the dynamics both */
 #define RTI_LATE 3       /* the deadline passed before a step was found */
+#define RTI_CUT 4        /* it passed within the program, whose iterate was the last step */
 int32_t rti_step_full(rti_solver *s);
-int32_t rti_step_globalised(rti_solver *s);
+/* `cut`: the step may end as RTI_CUT. */
+int32_t rti_step_globalised(rti_solver *s, int32_t cut);
 /* The last step of a real-time iteration: `here` moves, its stages stay those of the linearisation;
  * fills s->leap. */
 int32_t rti_leap_on(rti_solver *s);

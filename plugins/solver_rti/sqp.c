@@ -177,18 +177,21 @@ static double largest_gap(rti_solver *s) {
 
 static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info) {
     const rti_leap *leap = &s->leap;
-    const double gap = largest_gap(s);
     scatter(&s->shape, s->here.w, out->x, out->u);
     write_multipliers(s, out);
     info->objective = (leap->taken ? leap->cost : s->here.cost) / s->scale;
     info->kkt_residual = worst(&s->residuals);
-    info->primal_residual = leap->taken ? fmax(leap->first_gap, (1 - leap->length) * gap) : gap;
+    info->primal_residual = leap->taken ? fmax(leap->first_gap, leap->left) : largest_gap(s);
 }
 
-/* Real-time iterations need a start near the solution: multipliers and a given first state. Any
- * other window is solved as by `robust`. */
+/* Full steps need a start near the solution: multipliers and a given first state. */
+static int32_t is_near(const rti_solver *s) {
+    return s->warm && s->qp.riccati.first_is_fixed;
+}
+
+/* Any other window is solved as by `robust`. */
 static int32_t is_real_time(const rti_solver *s) {
-    return s->config->preset != RTI_ROBUST && s->warm && s->qp.riccati.first_is_fixed;
+    return s->config->preset != RTI_ROBUST && is_near(s);
 }
 
 static int32_t iteration_limit(const rti_solver *s) {
@@ -218,7 +221,7 @@ static void tell_progress(const rti_solver *s, const mhe_solve_control *control,
 
 /* From the evaluated start; gives MHE_SOLVE_*. */
 static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t *iterations) {
-    const int32_t limit = iteration_limit(s), real_time = is_real_time(s);
+    const int32_t limit = iteration_limit(s), near = is_near(s), real_time = is_real_time(s);
     s->penalty = s->damping = 0;
     s->least_excess = INFINITY;
     for (*iterations = 0;;) {
@@ -231,7 +234,7 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
         const int32_t last = real_time && *iterations + 1 == limit;
         const int32_t result = last        ? rti_leap_on(s)
                                : real_time ? rti_step_full(s)
-                                           : rti_step_globalised(s);
+                                           : rti_step_globalised(s, near && *iterations == 0);
         s->iteration_time = rti_now() - begin;
         if (result == RTI_STUCK) {
             return MHE_SOLVE_FAILED;
@@ -244,9 +247,9 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
             rti_measure(s);
             return MHE_SOLVE_INFEASIBLE;
         }
-        if (last) {
+        if (last || result == RTI_CUT) {
             tell_progress(s, control, *iterations);
-            return judge(s);
+            return result == RTI_CUT ? MHE_SOLVE_DEADLINE : judge(s);
         }
     }
 }

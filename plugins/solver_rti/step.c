@@ -10,9 +10,15 @@
 #define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
 #define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
 #define MOST_DAMPING 1e9
+#define PENALTY 1.5 /* of the gaps, times the largest multiplier */
 #define NEARER                                                                         \
     0.5 /* part of the least residual so far that a step may leave, whatever its merit \
          */
+
+static int32_t is_late(const void *data) {
+    const rti_solver *s = data;
+    return isfinite(s->deadline) && rti_now() >= s->deadline;
+}
 
 /* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
  * closely: what is left of them, times large multipliers, is noise in the merit function. */
@@ -23,7 +29,9 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
                               .feasibility = fmax(1e-4 * s->config->tolerance, 1e-12),
                               .complementarity = 0.01 * s->config->tolerance,
                               .max_iterations = s->config->max_qp_iterations,
-                              .regularisation = 1e-9};
+                              .regularisation = 1e-9,
+                              .is_late = isfinite(s->deadline) ? is_late : NULL,
+                              .data = s};
     for (size_t i = 0; i < n; i++) {
         q->lower[i] = s->lower[i] - s->here.w[i];
         q->upper[i] = s->upper[i] - s->here.w[i];
@@ -80,26 +88,7 @@ static void accept(rti_solver *s, double length) {
     accept_multipliers(s, length);
 }
 
-int32_t rti_step_full(rti_solver *s) {
-    rti_set_damping(s, &s->here, s->config->regularisation);
-    if (solve_program(s, 0) == QP_FAILED) {
-        return RTI_STUCK;
-    }
-    double length = 1;
-    for (int32_t i = 0; i <= MAX_HALVINGS; i++, length /= 2) {
-        reach(s, length);
-        if (rti_evaluate(s, &s->trial, RTI_ALL)) {
-            accept(s, length);
-            return RTI_MOVED;
-        }
-        if (s->failure != MHE_OK) {
-            break;
-        }
-    }
-    return RTI_STUCK;
-}
-
-/* The quadratic model without its damping at the trial point, scaled. */
+/* The quadratic model without its damping at the trial point, scaled; the step -> s->slope. */
 static double model_cost(rti_solver *s) {
     const qp_shape *shape = &s->shape;
     double cost = s->here.cost;
@@ -119,26 +108,89 @@ static double model_cost(rti_solver *s) {
     return cost;
 }
 
-int32_t rti_leap_on(rti_solver *s) {
-    rti_leap *leap = &s->leap;
-    rti_set_damping(s, &s->here, s->config->regularisation);
-    const int32_t result = solve_program(s, 0);
-    if (result == QP_FAILED) {
-        return RTI_STUCK;
+/* Gaps at the trial point by the linearisation, of the step in s->slope: largest; the sum. */
+static double model_gaps(rti_solver *s, double *sum) {
+    const qp_shape *shape = &s->shape;
+    double largest = *sum = 0;
+    for (int32_t k = 0; k < shape->N; k++) {
+        const double *next = row_z(shape, s->slope, k + 1) + shape->n_u;
+        double *gap = row_x(shape, s->gaps, k);
+        for (int32_t i = 0; i < shape->n_x; i++) {
+            gap[i] = s->here.stages[k].b[i] - next[i];
+        }
+        qp_forward(shape, &s->here.stages[k], row_z(shape, s->slope, k), gap);
+        for (int32_t i = 0; i < shape->n_x; i++) {
+            largest = fmax(largest, fabs(gap[i]));
+            *sum += fabs(gap[i]);
+        }
     }
+    return largest;
+}
+
+/* The merit function is exact where its penalty is above this. */
+static double largest_multiplier(const rti_solver *s) {
+    double largest = 0;
+    for (size_t i = 0; i < size_x(&s->shape); i++) {
+        largest = fmax(largest, fabs(s->qp.lambda[i]));
+    }
+    return largest;
+}
+
+/* The step to the result of a program as the last of a solve. That of a program cut short is taken
+ * where it lowers the merit function of the linearised problem. */
+static int32_t leap(rti_solver *s, int32_t result) {
+    rti_leap *leap = &s->leap;
     *leap = (rti_leap){.solved = result == QP_SOLVED, .length = 1};
     for (int32_t i = 0; i <= MAX_HALVINGS; i++, leap->length /= 2) {
         reach(s, leap->length);
         leap->first_gap = rti_first_gap(s, s->trial.w);
+        if (s->failure != MHE_OK) {
+            break;
+        }
         if (isfinite(leap->first_gap)) {
+            double sum;
+            const double penalty = PENALTY * largest_multiplier(s);
+            leap->cost = model_cost(s);
+            leap->left = model_gaps(s, &sum);
+            if (result == QP_LATE &&
+                !(leap->cost + penalty * sum < s->here.cost + penalty * s->gap_sum)) {
+                return RTI_LATE;
+            }
             leap->taken = 1;
             leap->front = fmax(longest(s, 0, s->shape.n_u),
                                longest(s, s->shape.ld_z + s->shape.n_u, s->shape.n_x));
-            leap->cost = model_cost(s);
             double *const from = s->here.w;
             s->here.w = s->trial.w;
             s->trial.w = from;
             accept_multipliers(s, leap->length);
+            return result == QP_LATE ? RTI_CUT : RTI_MOVED;
+        }
+    }
+    return RTI_STUCK;
+}
+
+/* From a program that is not to be stepped on further. */
+static int32_t cut_short(rti_solver *s) {
+    return s->qp.iterations > 0 ? leap(s, QP_LATE) : RTI_LATE;
+}
+
+int32_t rti_leap_on(rti_solver *s) {
+    rti_set_damping(s, &s->here, s->config->regularisation);
+    const int32_t result = solve_program(s, 0);
+    return result == QP_FAILED ? RTI_STUCK : result == QP_LATE ? cut_short(s) : leap(s, result);
+}
+
+int32_t rti_step_full(rti_solver *s) {
+    rti_set_damping(s, &s->here, s->config->regularisation);
+    const int32_t result = solve_program(s, 0);
+    if (result == QP_FAILED || result == QP_LATE) {
+        return result == QP_FAILED ? RTI_STUCK : cut_short(s);
+    }
+    double length = 1;
+    for (int32_t i = 0; i <= MAX_HALVINGS; i++, length /= 2) {
+        reach(s, length);
+        if (rti_evaluate(s, &s->trial, RTI_ALL)) {
+            accept(s, length);
             return RTI_MOVED;
         }
         if (s->failure != MHE_OK) {
@@ -150,22 +202,16 @@ int32_t rti_leap_on(rti_solver *s) {
 
 /* ---- globalised by an exact penalty: merit = cost + penalty * sum |gap| ---- */
 
-static int32_t is_late(const rti_solver *s) {
-    return isfinite(s->deadline) && rti_now() >= s->deadline;
-}
-
 static double merit(const rti_solver *s, const rti_point *point) {
     return point->cost + s->penalty * rti_gap_sum(s, point);
 }
 
 /* Slope of the merit function along the step; raises the penalty above the multipliers first. */
 static double merit_slope(rti_solver *s) {
-    double largest = 0, slope = 0;
-    for (size_t i = 0; i < size_x(&s->shape); i++) {
-        largest = fmax(largest, fabs(s->qp.lambda[i]));
-    }
+    const double largest = largest_multiplier(s);
+    double slope = 0;
     if (s->penalty < 1.1 * largest) {
-        s->penalty = 1.5 * largest;
+        s->penalty = PENALTY * largest;
     }
     for (int32_t k = 0; k <= s->shape.N; k++) {
         const double *step = row_z(&s->shape, s->qp.w, k);
@@ -222,6 +268,9 @@ static int32_t second_look(rti_solver *s, double slope) {
     for (int32_t k = 0; k < shape->N; k++) {
         memcpy(s->here.stages[k].b, row_x(shape, s->gaps, k), bytes);
     }
+    if (result == QP_LATE) {
+        return 0;
+    }
     if (result == QP_SOLVED) {
         reach(s, 1);
         if (rti_evaluate(s, &s->trial, RTI_ALL) && is_better(s, 1, slope)) {
@@ -271,10 +320,13 @@ static double try_step(rti_solver *s, int32_t result) {
     return s->failure == MHE_OK && !is_late(s) ? search(s, slope) : 0;
 }
 
-int32_t rti_step_globalised(rti_solver *s) {
+int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
     while (s->damping <= MOST_DAMPING) {
         rti_set_damping(s, &s->here, s->config->regularisation + s->damping);
         const int32_t result = solve_program(s, 0);
+        if (result == QP_LATE) {
+            return cut && s->damping == 0 ? cut_short(s) : RTI_LATE;
+        }
         const double before = s->gap_sum;
         const double length = result == QP_FAILED ? 0 : try_step(s, result);
         if (length > 0) {

@@ -81,7 +81,9 @@ typedef struct mhe_solution {
 /* Limits of one solve. */
 typedef struct mhe_solve_control {
     uint32_t size;
-    double deadline; /* s of CLOCK_MONOTONIC at which to stop with the best iterate; 0: none */
+    double deadline; /* s of CLOCK_MONOTONIC at which to stop with the best iterate; 0: none.
+                      * Where this is looked at between iterations, the last one should not begin
+                      * if it would end later by the time that those before took. */
     void *data;      /* for progress */
     /* Called after each iteration; non-zero stops with MHE_SOLVE_INTERRUPTED. May be NULL. */
     int32_t (*progress)(void *data, int32_t iteration, double objective, double kkt_residual);

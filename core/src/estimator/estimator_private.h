@@ -69,7 +69,6 @@ struct mhe_estimator {
     double budget;  /* from a frame's arrival to its estimate; 0: no limit */
     double arrival; /* of the frame in work */
     double ahead;   /* spent by mhe_estimator_prepare on the next estimate */
-    double per_iteration;
 
     const atomic_int *stop; /* by a signal; NULL: never */
     int32_t failure_told;   /* the host knows that the solver gave an error */

@@ -43,29 +43,15 @@ static void predict(mhe_estimator *e) {
     }
 }
 
-#define LEARN 0.2 /* weight of the last solve in what an iteration is thought to take */
-
-/* When a solver, which looks at the clock between iterations, is to begin no more: one iteration
- * before the time is over, but never before half of it, or a busy moment of the machine would stop
- * all solves that follow. */
-static double latest_start(const mhe_estimator *e) {
-    return e->arrival + e->budget - fmin(e->per_iteration, 0.5 * e->budget);
-}
-
 static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
-    const double begin = mhi_now();
-    const mhe_solve_control control = {.size = sizeof control, .deadline = latest_start(e)};
+    const mhe_solve_control control = {.size = sizeof control, .deadline = e->arrival + e->budget};
     *info = (mhe_solve_info){.size = sizeof *info};
-    mhe_status status =
-        e->solver->solve(e->solver_self, e->budget > 0 ? &control : NULL, &e->solution, info, err);
-    if (info->iterations > 0) {
-        e->per_iteration += LEARN * ((mhi_now() - begin) / info->iterations - e->per_iteration);
-    }
-    return status;
+    return e->solver->solve(e->solver_self, e->budget > 0 ? &control : NULL, &e->solution, info,
+                            err);
 }
 
 static int32_t out_of_time(const mhe_estimator *e) {
-    return e->budget > 0 && mhi_now() >= latest_start(e);
+    return e->budget > 0 && mhi_now() >= e->arrival + e->budget;
 }
 
 /* Largest change of a velocity or activation of the first state. */

@@ -1,0 +1,167 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Deadlines that pass anywhere in a solve. The clock is this program's: every look at it is a
+ * microsecond, so a deadline of n microseconds passes at the n-th look, on any machine. */
+#include "rig.h"
+#include "support.h"
+
+#include <math.h>
+#include <mhe/abi.h>
+#include <string.h>
+#include <time.h>
+
+#define N 7
+#define WINDOWS 4 /* behind them comes the one that is cut */
+#define BEGIN 1e-3
+#define TICK 1e-6
+#define CONSISTENT 1e-2 /* gaps that an estimator hands on */
+#define X ((N + 1) * TOY_ARM_X)
+#define U (N * TOY_ARM_U)
+#define VALUES (3 * (X + U) + N * TOY_ARM_X)
+
+static int64_t looks; /* at the clock */
+
+/* Comes before the C library's, for plugins too. */
+MHE_EXPORT int clock_gettime(clockid_t id, struct timespec *time) {
+    (void)id;
+    looks++;
+    time->tv_sec = 0;
+    time->tv_nsec = (long)(1e9 * (BEGIN + TICK * (double)looks));
+    return 0;
+}
+
+static double targets[N + 1 + WINDOWS][TOY_ARM_TARGET];
+
+/* Markers and excitations of a motion of the arm. */
+static void move(void) {
+    toy t;
+    double x[TOY_ARM_X] = {0}, u[TOY_ARM_U], next[TOY_ARM_X];
+    toy_arm(&t, N, 0.03);
+    for (int k = 0; k < N + 1 + WINDOWS; k++) {
+        toy_arm_truth(k * 0.03, u);
+        toy_arm_markers(x, targets[k]);
+        memcpy(targets[k] + TOY_ARM_TARGET - TOY_ARM_U, u, sizeof u);
+        toy_step(&t, x, u, next, NULL, NULL);
+        memcpy(x, next, sizeof x);
+    }
+    toy_free(&t);
+}
+
+/* One solve of the last window, from the same start each time. */
+typedef struct solve {
+    double values[VALUES];
+    double w[X + U];
+    mhe_solve_info info;
+    double gap; /* largest |x_{k+1} - F_k| */
+    int64_t looks;
+} solve;
+
+static void assert_sound(const rig *r, const toy *t) {
+    const size_t n_values = VALUES;
+    for (size_t i = 0; i < n_values; i++) {
+        assert_true(isfinite(r->memory[i]));
+    }
+    for (int i = 0; i < X; i++) {
+        assert_true(r->at.x[i] >= t->problem.x_lower[i] && r->at.x[i] <= t->problem.x_upper[i]);
+    }
+    for (int i = 0; i < U; i++) {
+        assert_true(r->at.u[i] >= t->problem.u_lower[i] && r->at.u[i] <= t->problem.u_upper[i]);
+    }
+}
+
+/* `ticks` to go; 0: no deadline. `cold`: the first window, without multipliers. */
+static void run(const char *yaml, int cold, int64_t ticks, solve *s) {
+    toy t;
+    rig r;
+    toy_arm(&t, N, 0.03);
+    assert_int_equal(rig_open(&r, &t, yaml), MHE_OK);
+    for (int k = 0; k < WINDOWS && !cold; k++) {
+        t.target = targets[k];
+        assert_int_equal(rig_solve(&r, NULL), MHE_OK);
+        rig_shift(&r);
+    }
+    t.target = targets[cold ? 0 : WINDOWS];
+    if (!cold) {
+        assert_int_equal(r.ops->prepare(r.solver, &r.at, &r.error), MHE_OK);
+    }
+    looks = 0;
+    const mhe_solve_control control = {.size = sizeof control,
+                                       .deadline = BEGIN + TICK * ((double)ticks - 0.5)};
+    assert_int_equal(rig_solve(&r, ticks > 0 ? &control : NULL), MHE_OK);
+    s->looks = looks;
+    s->info = r.info;
+    memcpy(s->values, r.memory, sizeof s->values);
+    memcpy(s->w, r.at.x, sizeof(double) * X);
+    memcpy(s->w + X, r.at.u, sizeof(double) * U);
+    s->gap = rig_check(&r).primal;
+    assert_sound(&r, &t);
+    rig_close(&r);
+    toy_free(&t);
+}
+
+static double off(const solve *a, const solve *b) {
+    double most = 0;
+    for (int i = 0; i < X + U; i++) {
+        most = fmax(most, fabs(a->w[i] - b->w[i]));
+    }
+    return most;
+}
+
+/* What a deadline at each look of a whole solve comes to. */
+typedef struct tally {
+    int64_t late;        /* ... looks at most after the deadline */
+    int stopped, usable; /* solves cut, and those with a consistent motion */
+    double worst, start; /* farthest of these, and the start, from the whole solve's result */
+} tally;
+
+static void sweep(const char *yaml, int cold, tally *t) {
+    static solve whole, cut, start;
+    run(yaml, cold, 0, &whole);
+    run(yaml, cold, 1, &start); /* late at once: as it came */
+    assert_int_equal(start.info.outcome, MHE_SOLVE_DEADLINE);
+    assert_int_equal(start.info.iterations, 0);
+    *t = (tally){.start = off(&start, &whole)};
+    for (int64_t ticks = 2;; ticks++) {
+        run(yaml, cold, ticks, &cut);
+        if (cut.info.outcome == whole.info.outcome) {
+            assert_memory_equal(cut.values, whole.values, sizeof cut.values);
+            break;
+        }
+        assert_int_equal(cut.info.outcome, MHE_SOLVE_DEADLINE);
+        assert_true(cut.info.iterations <= whole.info.iterations);
+        assert_true(cold || cut.gap <= start.gap);
+        t->late = cut.looks - ticks > t->late ? cut.looks - ticks : t->late;
+        t->stopped++;
+        if (cut.info.primal_residual <= CONSISTENT) {
+            t->usable++;
+            t->worst = fmax(t->worst, off(&cut, &whole));
+            assert_true(cut.gap <= 3 * CONSISTENT); /* gaps were told by the linearisation */
+        }
+    }
+}
+
+static void cut_anywhere(void **state) {
+    (void)state;
+    static const char *const presets[] = {"{preset: speed}", "{preset: balanced}", "{}"};
+    move();
+    for (int i = 0; i < 3; i++) {
+        for (int cold = 0; cold < 2; cold++) {
+            tally t;
+            sweep(presets[i], cold, &t);
+            print_message("%s%s: %d deadlines, %d with a motion, at most %.2g off (the start "
+                          "%.2g); %d looks late\n",
+                          presets[i], cold ? ", cold" : "", t.stopped, t.usable, t.worst, t.start,
+                          (int)t.late);
+            /* What runs then is seen through: an evaluation, which looks at its begin and end. */
+            assert_true(t.late <= 3);
+            if (!cold) { /* one interior-point step, and the program's iterate is worth taking */
+                assert_true(t.usable > 0 && t.stopped - t.usable <= 5);
+                assert_true(t.worst <= 0.05 * t.start);
+            }
+        }
+    }
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(cut_anywhere)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
