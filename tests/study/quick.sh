@@ -49,6 +49,24 @@ quick "$source/models/arm19/studies/study-window-quick.yaml" figure3.pdf figure4
 quick "$source/models/arm19/studies/study-emg-subset-quick.yaml" force.pdf anova-force.csv
 quick "$source/models/arm35/studies/study-muscles-quick.yaml" rate.png
 
+# The page of the comparison with the paper is filled from the tables, again and again the same.
+if [ $reports -eq 1 ]; then
+    page() { "$python" -B "$source/docs/study/update.py" --to page "$@" > out.txt 2> err.txt; }
+    mkdir page
+    cp "$source/docs/study.md" page
+    page study-noise-quick study-window-quick study-emg-subset-quick study-muscles-quick || fail "page: $(cat err.txt)"
+    for row in 'about 24 Hz | [0-9]' '3.7 × real time | `mhe.solver.ipopt`' 'force errors of 1 to 30 N | [0-9]' 'excitation | 7 | 3 | [0-9]' \
+        'mid | subset | [0-9]' 'noise | 48 of 48 '; do
+        grep -q "^| .*$row" page/study.md || grep -q "^| $row" page/study.md || fail "the page lacks '$row'"
+    done
+    [ -s page/study/window/figure3.png ] && cmp page/study/noise/results.csv study-noise-quick/results.csv || fail "tables are not taken over"
+    page --check || fail "a page just filled is stale: $(cat out.txt err.txt)"
+    sed -i 's/^| about 24 Hz | [0-9]*/| about 24 Hz | 1/' page/study.md
+    page --check && fail "a changed page is taken for fresh"
+    page small && fail "a folder without a report is taken over"
+    grep -q 'mhe-study report small' err.txt || fail "a folder without a report: $(cat err.txt)"
+fi
+
 # What the section may say is told where it is wrong, and what it shows can change without running anything again.
 if [ $reports -eq 1 ]; then
     cp "$source"/models/arm19/studies/*.yaml .

@@ -101,6 +101,13 @@ class Report:
             self.page.text(line)
             print(line)
         self.save_table("conditions", table, "Conditions")
+        summary = {
+            "trials": len(t), "planned": s["n_trials"], "failed": failed, "below": below, "solves": int(t["solves"].sum()),
+            "converged_mean": percent.mean(), "converged_min": percent.min(), "converged_max": percent.max(),
+            "seconds": t["seconds"].sum(), "peak_rss_mb": t["peak_rss_mb"].max(),
+            "processor": s["processor"], "version": s["version"], "seed": s["seed"],
+        }
+        pd.DataFrame([summary]).to_csv(os.path.join(self.out, "summary.csv"), index=False, float_format="%.6g")
 
     def noise_example(self, asked):
         path = os.path.join(self.out, "noise_example.csv")

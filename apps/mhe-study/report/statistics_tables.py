@@ -106,7 +106,7 @@ ERRORS = ["q_deg", "qdot_rad_s", "activation", "excitation", "force_n", "marker_
 
 
 def conditions(frame, factors):
-    """Per condition: trials, counted ones, convergence of all, and mean and spread of the errors of the counted."""
+    """Per condition: trials, counted ones, convergence and rate of all, and mean and spread of the errors of the counted."""
     rows = []
     for key, part in cells(frame, factors):
         counted = part[part["counted"] == 1]
@@ -115,5 +115,6 @@ def conditions(frame, factors):
         for name in ERRORS:
             row[name] = counted[name].mean()
             row[name + "_sd"] = counted[name].std(ddof=1)
+        row.update(rate_hz=part["rate_hz"].mean(), rate_hz_sd=part["rate_hz"].std(ddof=1))
         rows.append(row)
     return pd.DataFrame(rows)
