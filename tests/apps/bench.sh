@@ -5,15 +5,7 @@
 set -u
 bench=$1/mhe-bench
 demo=$2/models/arm19/demo.yaml
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
+. "$(dirname "$0")/../support/script.sh"
 
 # has FILE 'TEXT'...
 has() {
@@ -102,5 +94,4 @@ refused 'too few' "$demo" --quick --vary horizon.window=3,900
 "$bench" --help | grep -q -- '--vary' || fail "--help"
 "$bench" --version | grep -q '^mhe-bench [0-9]' || fail "--version"
 
-[ $failed -eq 0 ] && echo "bench: all as it should be"
-[ $failed -eq 0 ]
+finish "bench"

@@ -5,18 +5,7 @@
 set -u
 bin=$1
 demo=$2/models/arm19/demo.yaml
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
-
-# number KEY of summary.json, the first of that name
-number() { sed -n "s/.*\"$1\":[[:space:]]*\\([-0-9.e]*\\).*/\\1/p" "$2/summary.json" | head -n 1; }
+. "$(dirname "$0")/../support/script.sh"
 
 # holds 'EXPRESSION' for awk
 holds() { awk "BEGIN { exit !($1) }"; }
@@ -77,5 +66,4 @@ awk 'FNR == NR && FNR > 7 { q[FNR] = $2; next }
      END { exit !(worst < 1e-2) }' motion/reference.sto "$2/models/arm19/demo_reference.sto" ||
     fail "mhe-sim follow makes another motion"
 
-[ $failed -eq 0 ] && echo "demo: all as it should be"
-[ $failed -eq 0 ]
+finish "demo"

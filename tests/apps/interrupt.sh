@@ -7,15 +7,7 @@ set -u
 run=$1
 hanging=$2
 demo=$3/models/arm19/demo.yaml
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
+. "$(dirname "$0")/../support/script.sh"
 
 # interrupted FOLDER [arguments]: SIGTERM once the results are begun -> status, err.txt
 interrupted() {
@@ -54,5 +46,4 @@ MHE_PLUGIN_PATH=$MHE_PLUGIN_PATH:$hanging
 interrupted hanging --set 'costs=[test.cost.hanging]'
 ended hanging 'nothing is written' 0
 
-[ "$failed" -eq 0 ] && echo ok
-[ "$failed" -eq 0 ]
+finish "SIGTERM"

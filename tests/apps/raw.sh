@@ -6,18 +6,7 @@
 set -u
 bin=$1
 arm=$2/models/arm19
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
-
-# number KEY of summary.json, the first of that name
-number() { sed -n "s/.*\"$1\":[[:space:]]*\\([-0-9.e]*\\).*/\\1/p" "$2/summary.json" | head -n 1; }
+. "$(dirname "$0")/../support/script.sh"
 
 # within NAME KEY LOW HIGH
 within() {
@@ -65,5 +54,4 @@ cmp -s made/recording.c3d other/recording.c3d && fail "another seed, the same re
 "$bin/mhe-sim" noise "$arm/demo_recording.yaml" --out odd --set noise.raw_emg.rate=1999 > /dev/null 2> odd.txt
 [ $? -eq 2 ] && grep -q 'must be a multiple of the markers' odd.txt || fail "1999 Hz: $(cat odd.txt)"
 
-[ $failed -eq 0 ] && echo "raw EMG: all as it should be"
-[ $failed -eq 0 ]
+finish "raw EMG"

@@ -5,15 +5,7 @@
 set -u
 run=$1
 demo=$2/models/arm19/demo.yaml
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
+. "$(dirname "$0")/../support/script.sh"
 
 begin=$(date +%s%N)
 "$run" "$demo" --realtime --quiet --out live --set 'solver={plugin: mhe.solver.rti, preset: speed}' \
@@ -38,5 +30,4 @@ grep -q '"realtime"' file/summary.json && fail "a run from files by the clock"
 "$run" --check "$demo" --set output.node=8 > out.txt 2> err.txt && fail "node 8 of 7 was taken"
 grep -qF "'8' is no node" err.txt || fail "the message: $(cat err.txt)"
 
-[ "$failed" -eq 0 ] && echo ok
-[ "$failed" -eq 0 ]
+finish "by the clock"

@@ -5,16 +5,8 @@
 set -u
 sim=$1
 model=$2/models/arm19/arm19.osim
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$(dirname "$0")/../support/script.sh"
 export XDG_CACHE_HOME="$work/cache"
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
 
 write_config() {
     cat > short.yaml << END
@@ -152,5 +144,4 @@ paste levels/co0/reference.sto levels/co1/reference.sto |
 "$sim" reference "$shipped/reference.yaml" --set solver.max_iterations=1 > out.txt 2> err.txt
 [ $? -eq 1 ] && grep -qF "step 'there' did not converge in 1 iterations" err.txt || fail "shipped config: $(cat err.txt)"
 
-[ $failed -eq 0 ] && echo "reference: all as it should be"
-[ $failed -eq 0 ]
+finish "reference"
