@@ -2,8 +2,10 @@
 #include "diagnosis.h"
 
 #include "base/arena.h"
+#include "exchange.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define NAMED 3          /* worst ones named in a line */
@@ -25,6 +27,7 @@ struct diagnosis {
     const mhe_estimator_info *info;
     const mhi_run *run;
     const mhi_recording *recording;
+    const mhi_system *system;
     int32_t frame; /* of the recording, of the last estimate */
     int32_t n, n_seen, n_wanted;
     double *distance, *emg;
@@ -35,7 +38,8 @@ struct diagnosis {
 };
 
 mhe_status diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
-                            const mhi_recording *recording, diagnosis **result, mhe_error *err) {
+                            const mhi_recording *recording, const mhi_system *system,
+                            diagnosis **result, mhe_error *err) {
     mhi_arena arena = {0};
     diagnosis *d = MHI_TAKE(&arena, diagnosis, 1);
     const int32_t n_k = info->n_markers;
@@ -46,6 +50,7 @@ mhe_status diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
     d->info = info;
     d->run = run;
     d->recording = recording;
+    d->system = system;
     d->distance = MHI_TAKE(&arena, double, n_k);
     d->emg = MHI_TAKE(&arena, double, info->n_muscles);
     d->markers = MHI_TAKE(&arena, tally, n_k);
@@ -170,6 +175,47 @@ static int32_t worst(const tally *all, int32_t n, double least, int32_t *which) 
     return found;
 }
 
+/* Pairs whose labels are exchanged in all frames, which the posture nearest to all markers tells
+ * although the estimate may have come to terms with them. */
+static int32_t add_exchanges_of_all(const diagnosis *d, mhi_text *out) {
+    const mhe_estimator_info *f = d->info;
+    exchange pairs[NAMED];
+    uint8_t *suspect = calloc((size_t)f->n_markers + 1, 1);
+    int32_t n = 0;
+    for (int32_t i = 0; i < f->n_markers && suspect != NULL; i++) {
+        suspect[i] = rms(&d->markers[i]) > FAR;
+        n += suspect[i];
+    }
+    n = n == 0 ? 0 : exchange_find(d->system, d->recording, suspect, pairs, NAMED);
+    for (int32_t i = 0; i < n; i++) {
+        mhi_text_add(out,
+                     "markers %s and %s look exchanged: all markers are %.1f mm from the nearest "
+                     "posture (RMS), %.1f mm with these labels exchanged\n",
+                     f->marker_names[pairs[i].a], f->marker_names[pairs[i].b], 1e3 * pairs[i].as_is,
+                     1e3 * pairs[i].fixed);
+    }
+    free(suspect);
+    return n;
+}
+
+static void exchange_lines(const diagnosis *d, mhi_text *out) {
+    const mhe_estimator_info *f = d->info;
+    int32_t n = add_exchanges_of_all(d, out);
+    const int32_t of_all = n > 0;
+    for (int32_t i = 0; i < f->n_markers && !of_all; i++) {
+        for (int32_t j = i + 1; j < f->n_markers; j++) {
+            const int32_t at = i * f->n_markers + j;
+            if (d->exchanged[at] > 0 && d->exchanged[at] >= OFTEN * d->compared[at]) {
+                mhi_text_add(out, "markers %s and %s look exchanged in %.0f %% of the frames\n",
+                             f->marker_names[i], f->marker_names[j],
+                             100.0 * d->exchanged[at] / d->compared[at]);
+                n++;
+            }
+        }
+    }
+    mhi_text_add(out, n > 0 ? "try: exchange their labels in the marker file\n" : "");
+}
+
 static void marker_lines(const diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t which[NAMED], n = worst(d->markers, f->n_markers, 0, which);
@@ -184,18 +230,7 @@ static void marker_lines(const diagnosis *d, mhi_text *out) {
                      1e3 * rms(&d->markers[which[i]]));
     }
     mhi_text_add(out, "\n");
-    for (int32_t i = 0; i < f->n_markers; i++) {
-        for (int32_t j = i + 1; j < f->n_markers; j++) {
-            const int32_t at = i * f->n_markers + j;
-            if (d->exchanged[at] > 0 && d->exchanged[at] >= OFTEN * d->compared[at]) {
-                mhi_text_add(out,
-                             "markers %s and %s look exchanged in %.0f %% of the frames\n"
-                             "try: exchange their labels in the marker file\n",
-                             f->marker_names[i], f->marker_names[j],
-                             100.0 * d->exchanged[at] / d->compared[at]);
-            }
-        }
-    }
+    exchange_lines(d, out);
     if (rms(&d->markers[which[0]]) > FAR) {
         mhi_text_add(out,
                      "try: check the place of %s on the model and the model's scale; let "

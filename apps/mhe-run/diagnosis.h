@@ -5,14 +5,16 @@
 
 #include "base/text.h"
 #include "estimator/recording.h"
+#include "model/system.h"
 
 #include <mhe/estimator.h>
 
 typedef struct diagnosis diagnosis;
 
-/* `info`, `run` and `recording` must outlive it. [cold] */
+/* `info`, `run`, `recording` and `system` must outlive it. [cold] */
 mhe_status diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
-                            const mhi_recording *recording, diagnosis **result, mhe_error *err);
+                            const mhi_recording *recording, const mhi_system *system,
+                            diagnosis **result, mhe_error *err);
 void diagnosis_free(diagnosis *d);
 
 /* Compares an estimate with what was measured at its time. */

@@ -62,7 +62,8 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         status = mhi_outbox_open(s->out, &t->outbox, err);
     }
     if (status == MHE_OK && !s->check_only) {
-        status = diagnosis_create(&t->summary.info, s->run, t->recording, &t->diagnosis, err);
+        status =
+            diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis, err);
     }
     if (status == MHE_OK && !s->check_only) {
         status = results_open(t->outbox, &t->summary.info, t->recording, &s->run->output.formats,
@@ -181,6 +182,10 @@ static void tell(const tracking *t) {
 }
 
 static mhe_status finish(tracking *t, mhe_error *err) {
+    if (t->summary.tally.n_solves == 0 && !*interrupt_asked()) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "no frame has a marker or an angle to begin from; nothing is written");
+    }
     if (t->summary.tally.n_solves == 0) {
         return mhe_fail(err, MHE_E_INTERRUPTED,
                         "interrupted before the first estimate; nothing is written");

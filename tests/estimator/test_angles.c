@@ -1,11 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Measured joint angles in the place of markers: the demo's motion, with a gap. */
+#define _DEFAULT_SOURCE /* mkstemps */
 #include "estimator/recording.h"
 #include "fixture.h"
+#include "io/table.h"
 #include "support.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define N_Q 4
 #define N_M 19
@@ -17,10 +22,11 @@
 #define BY_MARKERS                                                                    \
     HEAD "data: {markers: " MODELS "demo_markers.trc, emg: " MODELS "demo_emg.sto}\n" \
          "costs: [mhe.cost.emg-markers-high]\n"
-#define BY_ANGLES                                                                      \
-    HEAD "data: {angles: " MODELS "demo_reference.sto, emg: " MODELS "demo_emg.sto}\n" \
-         "costs:\n  - {plugin: mhe.cost.track, signal: q, sigma: 0.001, weight: 30}\n" \
-         "  - {plugin: mhe.cost.track, signal: excitation, sigma: 0.1, weight: 30}\n"
+#define ANGLE_COSTS                                                               \
+    "costs:\n  - {plugin: mhe.cost.track, signal: q, sigma: 0.001, weight: 30}\n" \
+    "  - {plugin: mhe.cost.track, signal: excitation, sigma: 0.1, weight: 30}\n"
+#define BY_ANGLES \
+    HEAD "data: {angles: " MODELS "demo_reference.sto, emg: " MODELS "demo_emg.sto}\n" ANGLE_COSTS
 
 typedef struct motion {
     int32_t n;
@@ -97,6 +103,42 @@ static void gaps_are_bridged(void **state) {
     assert_true(force < 10);
 }
 
+/* The reference's angles as another program writes them: in degrees, said by the header. */
+static void write_degrees(char *path) {
+    mhi_table *t = NULL;
+    assert_int_equal(mhi_sto_read(MODELS "demo_reference.sto", &t, NULL), MHE_OK);
+    FILE *file = fdopen(mkstemps(path, 4), "w");
+    assert_non_null(file);
+    (void)fprintf(file, "angles\ninDegrees=yes\nendheader\ntime");
+    for (int32_t i = 0; i < N_Q; i++) {
+        (void)fprintf(file, "\t%s", t->labels[i]);
+    }
+    for (int32_t k = 0; k < t->n_rows; k++) {
+        (void)fprintf(file, "\n%.17g", t->time[k]);
+        for (int32_t i = 0; i < N_Q; i++) {
+            (void)fprintf(file, "\t%.17g", t->values[k * t->n_columns + i] * 180 / acos(-1));
+        }
+    }
+    assert_int_equal(fclose(file), 0);
+    mhi_table_free(t);
+}
+
+static void degrees_are_converted(void **state) {
+    (void)state;
+    static motion by_degrees;
+    char path[] = "/tmp/mhe-degrees-XXXXXX.mot", config[2048];
+    double q = 0, force = 0;
+    write_degrees(path);
+    (void)snprintf(config, sizeof config,
+                   HEAD "data: {angles: %s, emg: " MODELS "demo_emg.sto}\n" ANGLE_COSTS, path);
+    estimate(config, no_gap, &by_degrees);
+    (void)unlink(path);
+    compare(&angles, &by_degrees, &q, &force);
+    print_message("in degrees and in radians: %.1e rad, %.1e N apart\n", q, force);
+    assert_true(q < 1e-7); /* the reference has 12 digits */
+    assert_true(force < 1e-3);
+}
+
 static void mistakes_are_named(void **state) {
     (void)state;
     test_fixture f;
@@ -112,8 +154,8 @@ static void mistakes_are_named(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(forces_are_those_by_markers),
-                                       cmocka_unit_test(gaps_are_bridged),
-                                       cmocka_unit_test(mistakes_are_named)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(forces_are_those_by_markers), cmocka_unit_test(gaps_are_bridged),
+        cmocka_unit_test(degrees_are_converted), cmocka_unit_test(mistakes_are_named)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

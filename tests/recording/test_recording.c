@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A second of the real abduction: the model holds it, and faults of the data move the estimate by
  * no more than they should. Skipped where the reference data are absent. */
+#include "exchange.h"
 #include "support.h"
 #include "track.h"
 
@@ -148,6 +149,50 @@ static void robust_loss_resists_an_outlier(void **state) {
     track_close(&faulty);
 }
 
+static void exchange_columns(mhi_recording *r, int32_t n_k, int32_t a, int32_t b) {
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        for (int32_t i = 0; i < 3; i++) {
+            double *row = r->markers + (ptrdiff_t)k * 3 * n_k, value = row[3 * a + i];
+            row[3 * a + i] = row[3 * b + i];
+            row[3 * b + i] = value;
+        }
+    }
+}
+
+/* Two of a segment, of neighbours, left and right of the elbow: each is found, alone; and none is
+ * where all are right. */
+static void exchanged_labels_are_named(void **state) {
+    (void)state;
+    static const char *const pairs[][2] = {
+        {"EPICl", "EPICm"}, {"SCAP_IA", "SCAP_AA"}, {"DELT", "ARMl"}, {"CLAV_AC", "Acrom"}};
+    mhe_estimator *estimator = NULL;
+    mhe_error err = {0};
+    exchange found[3];
+    open_faulty(NULL, 0);
+    const int32_t n_k = faulty.model->n_markers;
+    uint8_t suspect[64];
+    memset(suspect, 1, sizeof suspect);
+    assert_in_range(n_k, 1, 64);
+    if (mhi_estimator_create(faulty.run, &track_host, &estimator, &err) != MHE_OK) {
+        fail_msg("%s", err.text);
+    }
+    const mhi_system *system = mhi_estimator_system(estimator);
+    assert_int_equal(exchange_find(system, faulty.recording, suspect, found, 3), 0);
+    for (size_t i = 0; i < sizeof pairs / sizeof pairs[0]; i++) {
+        const ptrdiff_t first = track_marker(&faulty, 0, pairs[i][0]) - faulty.recording->markers;
+        const ptrdiff_t other = track_marker(&faulty, 0, pairs[i][1]) - faulty.recording->markers;
+        const int32_t a = (int32_t)first / 3, b = (int32_t)other / 3;
+        exchange_columns(faulty.recording, n_k, a, b);
+        assert_int_equal(exchange_find(system, faulty.recording, suspect, found, 3), 1);
+        print_message("%s and %s: %.1f mm, exchanged %.1f mm\n", pairs[i][0], pairs[i][1],
+                      1e3 * found[0].as_is, 1e3 * found[0].fixed);
+        assert_true((found[0].a == a && found[0].b == b) || (found[0].a == b && found[0].b == a));
+        exchange_columns(faulty.recording, n_k, a, b);
+    }
+    mhe_estimator_close(estimator);
+    track_close(&faulty);
+}
+
 int main(void) {
     char data[512];
     if (test_data_path(data, sizeof data, "abduction") == NULL) {
@@ -160,6 +205,7 @@ int main(void) {
         cmocka_unit_test(segment_hidden_for_half_a_second),
         cmocka_unit_test(three_electrodes_dead),
         cmocka_unit_test(robust_loss_resists_an_outlier),
+        cmocka_unit_test(exchanged_labels_are_named),
     };
     return cmocka_run_group_tests(tests, measure_whole, close_all);
 }

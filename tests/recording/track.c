@@ -19,7 +19,7 @@ static const void *no_service(const mhe_host *host, const char *id) {
     return NULL;
 }
 
-static const mhe_host host = {.size = sizeof host, .log = drop_line, .service = no_service};
+const mhe_host track_host = {.size = sizeof track_host, .log = drop_line, .service = no_service};
 
 static void expect_ok(mhe_status status, const mhe_error *err) {
     if (status != MHE_OK) {
@@ -39,10 +39,10 @@ static void read_config(track *t, const char *data, const char *const *set, int3
                    MHE_TEST_SOURCE_DIR, config);
     assert_int_equal(symlink(data, link), 0);
     assert_int_equal(system(command), 0);
-    expect_ok(mhi_registry_create(&host, &t->registry, &err), &err);
+    expect_ok(mhi_registry_create(&track_host, &t->registry, &err), &err);
     expect_ok(mhi_run_read(config, set, n_set, t->registry, &t->run, &err), &err);
-    expect_ok(mhi_estimator_read_model(t->run, &host, &t->model, &err), &err);
-    expect_ok(mhi_recording_read(t->run, t->model, &host, &t->recording, &err), &err);
+    expect_ok(mhi_estimator_read_model(t->run, &track_host, &t->model, &err), &err);
+    expect_ok(mhi_recording_read(t->run, t->model, &track_host, &t->recording, &err), &err);
     assert_int_equal(unlink(link), 0); /* the model is read again: by its real path */
     (void)unlink(config);
     (void)rmdir(folder);
@@ -96,7 +96,7 @@ void track_run(track *t) {
     const mhi_recording *r = t->recording;
     mhe_estimator *estimator = NULL;
     mhe_error err = {0};
-    expect_ok(mhi_estimator_create(t->run, &host, &estimator, &err), &err);
+    expect_ok(mhi_estimator_create(t->run, &track_host, &estimator, &err), &err);
     for (int32_t k = TRACK_FIRST; k < TRACK_FIRST + TRACK_FRAMES; k++) {
         const mhe_frame frame = {.size = sizeof frame,
                                  .time = r->time[k],

@@ -23,6 +23,8 @@ typedef struct track {
     double ik_q[TRACK_MOST_VALUES], ik_rms[TRACK_FRAMES];
 } track;
 
+extern const mhe_host track_host; /* drops what it is told */
+
 /* Reads config and data with assignments `set` [n_set]; 0: the data are absent. */
 int track_open(track *t, const char *const *set, int32_t n_set);
 /* Pushes the piece's frames and keeps what comes out. */

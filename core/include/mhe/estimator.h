@@ -110,7 +110,8 @@ void mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *
 mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *err);
 
 /* Takes the next frame (time must increase). `*ready` is 1 when `estimate` was filled: from the
- * window's first fill on, at every ratio-th frame. A bad frame or a failed solve is told by
+ * window's first fill on, at every ratio-th frame; where frames have markers or angles, not before
+ * one is measured or the start is known. A bad frame or a failed solve is told by
  * estimate->status. MHE_E_ARGUMENT: time does not increase (or only less than a window back: then
  * the frame is out of order); the frame is not taken. MHE_E_INPUT: no marker of the first window is
  * within a metre of the model, or the frames are half a second or more apart (times in ms?); the

@@ -49,12 +49,14 @@ struct mhe_estimator {
     double *distance;  /* [n+1], scratch */
 
     /* How far the window is. */
-    int32_t begun;     /* it has a start; else the next solve begins it from the measurements */
-    int32_t settled;   /* its first state is known, and fixed; else free */
-    int32_t rounds;    /* proximal solves since it was begun */
-    int32_t prepared;  /* the start of the next solve is made */
-    int32_t restarted; /* begun again and no solve has succeeded since */
-    int32_t solved;    /* windows so far */
+    int32_t has_posture; /* a frame had markers or angles, be they missing */
+    int32_t waited;      /* used frames before the first window for want of a posture */
+    int32_t begun;       /* it has a start; else the next solve begins it from the measurements */
+    int32_t settled;     /* its first state is known, and fixed; else free */
+    int32_t rounds;      /* proximal solves since it was begun */
+    int32_t prepared;    /* the start of the next solve is made */
+    int32_t restarted;   /* begun again and no solve has succeeded since */
+    int32_t solved;      /* windows so far */
 
     /* How well it goes (recover.c). */
     double outlier;      /* m; 0: everything is believed */

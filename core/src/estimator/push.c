@@ -2,6 +2,7 @@
 /* push.c: frames in, estimates out. */
 #include "estimator/estimator_private.h"
 
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 
@@ -84,6 +85,43 @@ mhe_status mhe_estimator_prepare(mhe_estimator *e, mhe_error *err) {
     return status;
 }
 
+/* From a posture that is known or measured, or where none ever is from the EMG alone: a window
+ * whose markers are still hidden would wander anywhere, and take long for it. */
+static int32_t can_begin(const mhe_estimator *e) {
+    int32_t known = !e->has_posture;
+    for (int32_t i = 0; i < e->n_q && !known; i++) {
+        known = !isnan(e->start_q[i]) || !isnan(e->angles[i]);
+    }
+    for (int32_t i = 0; i < 3 * e->n_k && !known; i++) {
+        known = !isnan(e->markers[i]);
+    }
+    return known;
+}
+
+/* The first window from its measurements, once there is a posture in its oldest frame. */
+static mhe_status begin_window(mhe_estimator *e, int32_t *known, mhe_error *err) {
+    mhe_status status = e->interval > 0 ? MHE_OK : mhi_clock_measure(e, known, err);
+    if (status != MHE_OK || !*known) {
+        return status;
+    }
+    if (!can_begin(e)) {
+        e->waited++;
+        *known = 0;
+        mhi_window_advance(e);
+        return MHE_OK;
+    }
+    if (e->waited > 0) {
+        char line[160];
+        (void)snprintf(line, sizeof line,
+                       "no posture was measured in the %d frames before %.6g s: estimates begin "
+                       "there",
+                       (int)e->waited, e->times[0]);
+        e->host->log(e->host, MHE_LOG_WARNING, line);
+        e->waited = 0;
+    }
+    return mhi_window_begin(e, err);
+}
+
 /* Start and targets of the full window. `*known`: it can be solved. */
 static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err) {
     mhe_status status = MHE_OK;
@@ -95,8 +133,7 @@ static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err)
             (void)mhi_window_begin(e, NULL); /* where it cannot, the old start goes on */
         }
     } else {
-        status = e->interval > 0 ? MHE_OK : mhi_clock_measure(e, known, err);
-        status = status == MHE_OK && *known ? mhi_window_begin(e, err) : status;
+        status = begin_window(e, known, err);
     }
     if (status == MHE_OK && *known) {
         mhi_window_set_targets(e);
@@ -115,6 +152,7 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     }
     const double *emg = delayed_emg(e, frame->emg == NULL ? e->no_emg : frame->emg);
     e->n_frames++;
+    e->has_posture |= frame->markers != NULL || measured_angles(e, frame) != e->no_angles;
     mhi_recover_count_emg(e, emg);
     if (!used) {
         return MHE_OK;
