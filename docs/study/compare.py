@@ -9,9 +9,10 @@ import json
 import os
 import sys
 
-REPRODUCED, BETTER, NOT = "reproduced", "better", "not reproduced"
+REPRODUCED, BETTER, MOSTLY, NOT = "reproduced", "better", "mostly", "not reproduced"
 TRACKING = ["none", "low", "mid", "high"]
 LEVELS = ["none", "low", "mid", "high"]
+EMG_LEVELS = [0, 0.1, 0.25, 0.5, 1, "minimise"]  # of the study emg-level
 
 
 class WrongTable(Exception):
@@ -99,6 +100,11 @@ def holds(condition):
     return REPRODUCED if condition else NOT
 
 
+def holds_in(n, of):
+    """Mostly: in three of four comparisons or more."""
+    return REPRODUCED if n == of else MOSTLY if 4 * n >= 3 * of else NOT
+
+
 # ---- statements: windows and rates ----
 
 def window_seven(formulation, folder, **also):
@@ -123,7 +129,7 @@ def rate_activation(folder):
     gain = sum(by["activation"][n] / by["excitation"][n] for n in common) / len(common)
     return ("activation-driven about 10 Hz faster for the same window",
             f"faster at {len(faster)} of {len(common)} common windows, {gain:.1f} times on average",
-            holds(len(faster) == len(common)))
+            holds_in(len(faster), len(common)))
 
 
 def rate_standard(folder):
@@ -211,14 +217,14 @@ def minimise_worse(folder):
     n, better, sure, worse = compare_minimise(folder, "pairs-force", {"cocontraction": ["low", "mid", "high"]})
     return ("least excitation estimates forces worse than tracking at low, mid and high co-contraction",
             f"tracking better in {better} of {n} comparisons, {sure} of them significant; the other way round {worse}",
-            holds(sure == n))
+            holds_in(sure, n))
 
 
 def minimise_grows(folder):
     study = Study(folder, "noise")
     means = [study.mean("force_n", emg_objective="minimise", cocontraction=c) for c in LEVELS]
     return ("least excitation: force error grows with co-contraction", " / ".join(number(m) for m in means) + " N",
-            holds(all(a < b for a, b in zip(means, means[1:]))))
+            holds(sorted(means) == means))
 
 
 def insensitive(folder):
@@ -232,7 +238,7 @@ def emg_noise(folder):
     study = Study(folder, "noise")
     means = [study.mean("force_n", emg_objective=level) for level in TRACKING]
     return ("force error grows with EMG noise", " / ".join(number(m) for m in means) + " N",
-            holds(all(a < b for a, b in zip(means, means[1:]))))
+            holds(sorted(means) == means))
 
 
 def marker_noise(folder):
@@ -242,7 +248,7 @@ def marker_noise(folder):
     growing = [r for r in cells if r["mean_a"] < r["mean_b"]]
     return ("joint angle error grows with marker noise",
             " / ".join(number(m) for m in means) + f" deg; in {len(growing)} of {len(cells)} comparisons",
-            holds(all(a < b for a, b in zip(means, means[1:])) and len(growing) == len(cells)))
+            holds_in(len(growing), len(cells)) if sorted(means) == means else NOT)
 
 
 def emg_irrelevant(folder):
@@ -260,7 +266,7 @@ def low_weight(folder):
                                               {"weight": "low", "marker_noise": ["none", "low", "mid"]})
     return ("low marker weight: tracking estimates joint angles better than minimising at no, low and mid marker noise",
             f"better in {better} of {n} comparisons, {sure} of them significant; the other way round {worse}",
-            holds(sure == n))
+            holds_in(sure, n))
 
 
 def excitation_minimise(folder):
@@ -269,7 +275,7 @@ def excitation_minimise(folder):
     paper = [0.013, 0.041, 0.079, 0.091]
     return ("excitation error, minimising: 0.013 / 0.041 / 0.079 / 0.091 for no / low / mid / high co-contraction",
             " / ".join(number(m) for m in means),
-            holds(all(abs(m - p) <= 0.25 * p for m, p in zip(means, paper))))
+            BETTER if all(m <= p for m, p in zip(means, paper)) else holds(all(abs(m - p) <= 0.1 * p for m, p in zip(means, paper))))
 
 
 def excitation_track(folder):
@@ -313,9 +319,12 @@ def rates(folder):
 def forces(folder):
     study = Study(folder, "noise")
     objectives = study.levels("emg_objective", [*TRACKING, "minimise"])
-    return table(["co-contraction", *(f"tracking, EMG noise {o}" if o != "minimise" else o for o in objectives)],
-                 [[c, *(study.cell("force_n", cocontraction=c, emg_objective=o) for o in objectives)]
-                  for c in study.levels("cocontraction", LEVELS)])
+    labels = study.levels("cocontraction", LEVELS)
+    own = [number(r["force_n"]) for r in study["motions"]]
+    return table(["co-contraction", *(f"tracking, EMG noise {o}" if o != "minimise" else o for o in objectives),
+                  "the co-contraction's own forces"],
+                 [[c, *(study.cell("force_n", cocontraction=c, emg_objective=o) for o in objectives), f]
+                  for c, f in zip(labels, own)])
 
 
 def angles(folder):
@@ -338,7 +347,7 @@ def anova(name):
 
 def runs(folder):
     rows = []
-    for name in ("noise", "window", "muscles", "emg-subset"):
+    for name in ("noise", "window", "muscles", "emg-subset", "emg-level"):
         try:
             s = Study(folder, name)["summary"][0]
         except Missing:
@@ -357,9 +366,18 @@ def subset(folder):
                   for c in study.levels("cocontraction", LEVELS) for w in ("all", "subset")])
 
 
+def emg_level(folder):
+    study = Study(folder, "emg-level")
+    objectives = study.levels("emg_objective", EMG_LEVELS)
+    return table(["marker noise", *(f"tracking, EMG noise {number(o)}" if o != "minimise" else o for o in objectives)],
+                 [[m, *(study.cell("q_deg", marker_noise=m, emg_objective=o) for o in objectives)]
+                  for m in study.levels("marker_noise", LEVELS)])
+
+
 BLOCKS = {
     "verdicts-windows": verdicts("windows"), "verdicts-noise": verdicts("noise"), "rates": rates, "forces": forces,
     "angles": angles, "anova-force": anova("force"), "anova-angles": anova("angles"), "runs": runs, "subset": subset,
+    "emg-level": emg_level,
 }
 
 

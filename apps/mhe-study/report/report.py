@@ -145,18 +145,36 @@ class Report:
             runs = [self.read_sto(f) for f in files if os.path.exists(f)] if condition["forces"] else []
             if not runs:
                 continue
-            n = min(len(r) for r in runs)
-            stack = np.stack([r.iloc[:n, 1:].to_numpy() for r in runs])
+            first, n = int(asked.get("skip_first", 0)), min(len(r) for r in runs)
+            runs = [r.iloc[first:n] for r in runs]
+            stack = np.stack([r.iloc[:, 1:].to_numpy() for r in runs])
             names = runs[0].columns[1:]
             label = condition["labels"][by]
             label = asked.get("labels", {}).get(label, label)
             sd = stack.std(axis=0, ddof=1) if len(runs) > 1 else np.zeros(stack.shape[1:])
-            groups[label] = (runs[0]["time"][:n], pd.DataFrame(stack.mean(axis=0), columns=names), pd.DataFrame(sd, columns=names))
+            groups[label] = (runs[0]["time"], pd.DataFrame(stack.mean(axis=0), columns=names), pd.DataFrame(sd, columns=names))
             reference = self.read_sto(condition["motion"]) if os.path.exists(condition["motion"]) else reference
         if groups:
-            reference = reference if reference is not None else pd.DataFrame()
+            time = next(iter(groups.values()))[0]
+            reference = reference[reference["time"].between(time.min(), time.max())] if reference is not None else pd.DataFrame()
             self.save_figure(asked.get("name", "forces"), figures.forces(reference, groups),
                              "Muscle forces: reference, and mean and standard deviation of the trials.")
+
+    def motions(self):
+        """How far the true excitations and forces of the motions are from those of the first one."""
+        files = dict.fromkeys((c["reference"], c["motion"]) for c in self.study["conditions"])
+        motions = [(name, self.read_sto(path)) for name, path in files if os.path.exists(path)]
+        if len(motions) < 2 or len({len(m) for _, m in motions}) > 1:
+            return
+        rows = []
+        for name, motion in motions:
+            row = {"motion": name}
+            for column, prefix in (("excitation", "e_"), ("force_n", "F_")):
+                names = [c for c in motion.columns if c.startswith(prefix)]
+                row[column] = np.sqrt(((motion[names] - motions[0][1][names]) ** 2).mean()).mean() if names else np.nan
+            rows.append(row)
+        self.save_table("motions", pd.DataFrame(rows), "Motions",
+                        f"RMS difference of the true excitations and forces from those of {motions[0][0]}, mean over the muscles.")
 
     def anova(self, asked):
         y, name = self.column(asked["y"], "anova"), asked.get("name", asked["y"])
@@ -221,6 +239,7 @@ class Report:
                     getattr(self, name)(part)
                 except KeyError as missing:
                     raise WrongReport(f"report: {name}: the key {missing} is needed") from None
+        self.motions()
         self.end()
 
 

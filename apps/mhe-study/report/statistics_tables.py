@@ -80,7 +80,8 @@ def pairs(frame, response, of, within, levels=None, alpha=0.001):
             row = dict(zip(within, key), a=a, b=b, n_a=len(x), n_b=len(y), mean_a=x.mean(), mean_b=y.mean(),
                        t=np.nan, df=np.nan, p=np.nan, cohens_d=np.nan)
             if has_spread(x) or has_spread(y):
-                t, p = stats.ttest_ind(x, y, equal_var=False)
+                t, p = stats.ttest_ind_from_stats(x.mean(), np.std(x, ddof=1), len(x), y.mean(), np.std(y, ddof=1), len(y),
+                                                  equal_var=False)
                 u, v = np.var(x, ddof=1) / len(x), np.var(y, ddof=1) / len(y)
                 row.update(t=t, p=p, df=(u + v)**2 / (u**2 / (len(x) - 1) + v**2 / (len(y) - 1)),
                            cohens_d=cohens_d(x, y))
