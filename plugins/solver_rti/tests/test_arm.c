@@ -76,17 +76,28 @@ typedef struct tally {
     const char *motion, *formulation, *cost, *curves;
     int noisy, every; /* every so many windows are compared */
     int windows, by_rti, by_ipopt, both, agree;
+    int apart;              /* found two optima, and this solver confirms both */
     double x, u, objective; /* largest differences of those that agree */
     double any_objective;   /* ... and of all windows, converged or not */
 } tally;
+
+static double objective_difference(const contender *a, const contender *b) {
+    return fabs(a->info.objective - b->info.objective) / fabs(b->info.objective);
+}
+
+/* Started at the other's result, does this solver converge there? */
+static int confirms(contender *c, const contender *other) {
+    return contender_solve(c, other->at.x, other->at.u) &&
+           difference(c->at.x, other->at.x, c->n_x) < 1e-7 &&
+           difference(c->at.u, other->at.u, c->n_u) < 1e-7 && objective_difference(c, other) < 1e-9;
+}
 
 static void compare(contender *rti, contender *ipopt, const mhe_estimator *e, tally *t) {
     const int by_rti = contender_solve(rti, e->guess_x, e->guess_u);
     const int by_ipopt = contender_solve(ipopt, e->guess_x, e->guess_u);
     const double x = difference(rti->at.x, ipopt->at.x, rti->n_x);
     const double u = difference(rti->at.u, ipopt->at.u, rti->n_u);
-    const double objective =
-        fabs(rti->info.objective - ipopt->info.objective) / fabs(ipopt->info.objective);
+    const double objective = objective_difference(rti, ipopt);
     t->windows++;
     t->by_rti += by_rti;
     t->by_ipopt += by_ipopt;
@@ -97,6 +108,8 @@ static void compare(contender *rti, contender *ipopt, const mhe_estimator *e, ta
         t->x = fmax(t->x, x);
         t->u = fmax(t->u, u);
         t->objective = fmax(t->objective, objective);
+    } else if (by_rti && by_ipopt) {
+        t->apart += confirms(rti, ipopt);
     }
 }
 
@@ -165,11 +178,12 @@ static int follow(tally *t) {
     mhi_record_free(&markers);
     mhi_recording_free(r);
     test_fixture_close(&f);
-    print_message("%s%s, %s, %s, %s: %d windows, %d converged, %d of ipopt, %d of both, %d agree; "
-                  "largest difference x %.1e, u %.1e, objective %.1e, of any window %.1e\n",
-                  t->motion, t->noisy ? " with noise" : "", t->formulation, t->cost, t->curves,
-                  t->windows, t->by_rti, t->by_ipopt, t->both, t->agree, t->x, t->u, t->objective,
-                  t->any_objective);
+    print_message(
+        "%s%s, %s, %s, %s: %d windows, %d converged, %d of ipopt, %d of both, %d agree, %d apart; "
+        "largest difference x %.1e, u %.1e, objective %.1e, of any window %.1e\n",
+        t->motion, t->noisy ? " with noise" : "", t->formulation, t->cost, t->curves, t->windows,
+        t->by_rti, t->by_ipopt, t->both, t->agree, t->apart, t->x, t->u, t->objective,
+        t->any_objective);
     return 1;
 }
 
@@ -213,11 +227,13 @@ static void same_optimum_as_ipopt(void **state) {
     assert_true(agree >= 500);
 }
 
-/* With noise about one window in ten of the paper's curves ends where an activation sits on a kink:
- * there the one-sided derivatives vanish nowhere, and neither solver meets a tolerance. Some others
- * have two stationary points close by, and which of them is found depends on the start. What must
- * hold: this solver converges wherever Ipopt does, and both come to the same objective, if not to
- * the same digit. */
+/* With noise the windows of the paper's curves meet their kinks: the slope of the force-velocity
+ * curve changes where a muscle is at rest. An optimum may sit there, where one-sided derivatives
+ * vanish nowhere: then neither solver meets a tolerance (4 of the 47 windows; in 3 of them a muscle
+ * rests at a stage of the integrator, to 1e-5 m/s). Or there is one on either side, where the same
+ * muscles shorten in one and lengthen in the other, and each solver finds its own from the same
+ * start (3 windows, some 1e-3 rad/s apart). So: this solver converges wherever Ipopt does; where
+ * they differ, it confirms Ipopt's optimum as one when it starts there; all objectives agree. */
 static void kinks_stop_both(void **state) {
     (void)state;
     tally t = {"demo", "excitation", TRACK, "paper2021", .noisy = 1, .every = 2};
@@ -226,8 +242,9 @@ static void kinks_stop_both(void **state) {
     assert_true(t.windows > 40);
     assert_true(t.by_rti >= t.by_ipopt);
     assert_int_equal(t.both, t.by_ipopt);
-    assert_true(t.by_rti >= 0.8 * t.windows);
-    assert_true(t.agree >= 0.9 * t.both);
+    assert_true(t.by_rti >= 0.9 * t.windows);
+    assert_int_equal(t.agree + t.apart, t.both);
+    assert_true(t.apart <= 0.1 * t.both);
     assert_true(t.any_objective < 1e-6);
 }
 
