@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "arguments.h"
 
-#include "base/text.h"
 #include "console.h"
 
 #include <stdlib.h>
@@ -66,16 +65,8 @@ static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_err
         a->mode = MODE_VERSION;
     } else if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) {
         a->mode = MODE_HELP;
-    } else if (word[0] == '-' && word[1] != '\0') {
-        char hint[256];
-        return mhe_fail(
-            err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
-            mhi_suggest(hint, sizeof hint, word, words, sizeof words / sizeof words[0]));
-    } else if (a->config != NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "one config file at a time: '%s' and '%s'", a->config,
-                        word);
     } else {
-        a->config = word;
+        return console_config(word, words, sizeof words / sizeof words[0], &a->config, err);
     }
     return MHE_OK;
 }

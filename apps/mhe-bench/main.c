@@ -106,12 +106,6 @@ int main(int argc, char **argv) {
     } else if (status == MHE_OK) {
         status = run(&a, &host, &err);
     }
-    if (status == MHE_OK && fflush(stdout) != 0) {
-        status = mhe_fail(&err, MHE_E_IO, "the output could not be written");
-    }
-    if (status != MHE_OK) {
-        (void)fprintf(stderr, "mhe-bench: %s\n", err.text);
-    }
     arguments_free(&a);
-    return console_exit_status(status);
+    return console_end("mhe-bench", status, &err);
 }

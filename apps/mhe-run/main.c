@@ -68,13 +68,7 @@ int main(int argc, char **argv) {
                          : run_config(&a, &host, registry, &err);
         }
     }
-    if (status == MHE_OK && fflush(stdout) != 0) {
-        status = mhe_fail(&err, MHE_E_IO, "the output could not be written");
-    }
-    if (status != MHE_OK) {
-        (void)fprintf(stderr, "mhe-run: %s\n", err.text);
-    }
     mhi_registry_free(registry);
     free(a.set);
-    return console_exit_status(status);
+    return console_end("mhe-run", status, &err);
 }

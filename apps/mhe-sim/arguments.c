@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "arguments.h"
 
-#include "base/text.h"
+#include "console.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -46,9 +46,7 @@ static mhe_status take_option(const char *word, const char *value, int32_t takes
         known = known || strcmp(word, words[i]) == 0;
     }
     if (!known) {
-        char hint[256];
-        return mhe_fail(err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
-                        mhi_suggest(hint, sizeof hint, word, words, n_words));
+        return console_config(word, words, n_words, &a->config, err);
     }
     if (strcmp(word, "--no-cache") == 0) {
         a->no_cache = 1;
@@ -84,11 +82,8 @@ mhe_status arguments_parse(int argc, char **argv, int32_t takes, arguments *a, m
         if (argv[i][0] == '-') {
             status = take_option(argv[i], i + 1 < argc ? argv[i + 1] : NULL, takes, a, err);
             i += strcmp(argv[i], "--no-cache") != 0; /* the only one without a value */
-        } else if (a->config != NULL) {
-            status = mhe_fail(err, MHE_E_ARGUMENT, "one config file at a time: '%s' and '%s'",
-                              a->config, argv[i]);
         } else {
-            a->config = argv[i];
+            status = console_config(argv[i], NULL, 0, &a->config, err);
         }
     }
     if (status == MHE_OK &&

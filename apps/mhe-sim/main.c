@@ -6,9 +6,7 @@
 #include "noise.h"
 #include "reference.h"
 
-#include <mhe/version.h>
 #include <stdio.h>
-#include <string.h>
 
 static const char help[] =
     "Simulates motions of a musculoskeletal model (CVODES carries the state), and recordings.\n"
@@ -159,36 +157,17 @@ static mhe_status run_command(const struct command *command, int argc, char **ar
     return status;
 }
 
-static mhe_status unknown_command(const char *word, mhe_error *err) {
+int main(int argc, char **argv) {
+    mhe_error err = {0};
     const char *names[N_COMMANDS];
-    char hint[256];
+    int32_t chosen;
     for (int32_t i = 0; i < N_COMMANDS; i++) {
         names[i] = commands[i].name;
     }
-    (void)mhi_suggest(hint, sizeof hint, word == NULL ? "" : word, names, N_COMMANDS);
-    return word == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "no command is given%s", hint)
-                        : mhe_fail(err, MHE_E_ARGUMENT, "unknown command '%s'%s", word, hint);
-}
-
-int main(int argc, char **argv) {
-    mhe_error err = {0};
-    const char *word = argc >= 2 ? argv[1] : NULL;
-    mhe_status status = MHE_OK;
-    const struct command *command = NULL;
-    for (int32_t i = 0; i < N_COMMANDS && word != NULL; i++) {
-        command = strcmp(word, commands[i].name) == 0 ? &commands[i] : command;
+    mhe_status status = console_command("mhe-sim", help, names, N_COMMANDS,
+                                        argc >= 2 ? argv[1] : NULL, &chosen, &err);
+    if (chosen >= 0) {
+        status = run_command(&commands[chosen], argc, argv, &err);
     }
-    if (command != NULL) {
-        status = run_command(command, argc, argv, &err);
-    } else if (word != NULL && strcmp(word, "--version") == 0) {
-        (void)printf("mhe-sim %s\n", MHE_VERSION);
-    } else if (word != NULL && (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0)) {
-        (void)fputs(help, stdout);
-    } else {
-        status = unknown_command(word, &err);
-    }
-    if (status != MHE_OK) {
-        (void)fprintf(stderr, "mhe-sim: %s\n", err.text);
-    }
-    return console_exit_status(status);
+    return console_end("mhe-sim", status, &err);
 }

@@ -7,10 +7,8 @@
 #include "study.h"
 #include "submit.h"
 
-#include <mhe/version.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 static const char help[] =
     "Runs an estimator on simulated recordings under many conditions, many times.\n"
@@ -77,42 +75,20 @@ static mhe_status run_command(const struct command *command, int argc, char **ar
     return status;
 }
 
-static mhe_status unknown_command(const char *word, mhe_error *err) {
-    const char *names[N_COMMANDS];
-    char hint[256];
-    for (int32_t i = 0; i < N_COMMANDS; i++) {
-        names[i] = commands[i].name;
-    }
-    (void)mhi_suggest(hint, sizeof hint, word == NULL ? "" : word, names, N_COMMANDS);
-    return word == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "no command is given%s", hint)
-                        : mhe_fail(err, MHE_E_ARGUMENT, "unknown command '%s'%s", word, hint);
-}
-
 int main(int argc, char **argv) {
     mhe_error err = {0};
-    const char *word = argc >= 2 ? argv[1] : NULL;
-    mhe_status status = MHE_OK;
-    const struct command *command = NULL;
+    const char *names[N_COMMANDS];
+    int32_t chosen;
     /* Workers are processes: threads of a library below would only stand in each other's way. */
     (void)setenv("OMP_NUM_THREADS", "1", 0);
     (void)setenv("OPENBLAS_NUM_THREADS", "1", 0);
-    for (int32_t i = 0; i < N_COMMANDS && word != NULL; i++) {
-        command = strcmp(word, commands[i].name) == 0 ? &commands[i] : command;
+    for (int32_t i = 0; i < N_COMMANDS; i++) {
+        names[i] = commands[i].name;
     }
-    if (command != NULL) {
-        status = run_command(command, argc, argv, &err);
-    } else if (word != NULL && strcmp(word, "--version") == 0) {
-        (void)printf("mhe-study %s\n", MHE_VERSION);
-    } else if (word != NULL && (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0)) {
-        (void)fputs(help, stdout);
-    } else {
-        status = unknown_command(word, &err);
+    mhe_status status = console_command("mhe-study", help, names, N_COMMANDS,
+                                        argc >= 2 ? argv[1] : NULL, &chosen, &err);
+    if (chosen >= 0) {
+        status = run_command(&commands[chosen], argc, argv, &err);
     }
-    if (status == MHE_OK && fflush(stdout) != 0) {
-        status = mhe_fail(&err, MHE_E_IO, "the output could not be written");
-    }
-    if (status != MHE_OK) {
-        (void)fprintf(stderr, "mhe-study: %s\n", err.text);
-    }
-    return console_exit_status(status);
+    return console_end("mhe-study", status, &err);
 }
