@@ -80,7 +80,7 @@ def rate(trials, by, levels, standard_hz):
 def windows(trials, whole, by, levels):
     """Errors over the window, one logarithmic panel each; `whole`: trials whose window is the whole recording."""
     names = ["q_deg", "force_n", "marker_mm"]
-    figure, axes = plt.subplots(1, len(names), figsize=(WIDTH, 2.6))
+    figure, axes = plt.subplots(1, len(names), figsize=(WIDTH, 2.8))
     for axis, name in zip(axes, names):
         for i, level in enumerate(levels):
             colour = COLOURS[4 * (i % 2)]
@@ -93,7 +93,8 @@ def windows(trials, whole, by, levels):
         axis.xaxis.get_major_locator().set_params(integer=True)
         axis.set_xlabel("window N (intervals)")
         axis.set_title(title(name))
-    axes[-1].legend()
+    figure.get_layout_engine().set(rect=(0, 0, 1, 0.91))
+    figure.legend(*axes[0].get_legend_handles_labels(), ncol=4, loc="upper center")
     return figure
 
 
