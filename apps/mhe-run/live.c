@@ -3,8 +3,18 @@
 
 #include "measure.h"
 
+#include <sched.h>
 #include <stdlib.h>
 #include <time.h>
+
+#define PRIORITY 10 /* above all ordinary programs, below what the system itself may need */
+
+void live_raise(live *l) {
+    const struct sched_param wanted = {.sched_priority = PRIORITY};
+    const int given = sched_getscheduler(0);
+    l->raised = given == SCHED_OTHER && sched_setscheduler(0, SCHED_FIFO, &wanted) == 0;
+    l->has_priority = l->raised || given == SCHED_FIFO || given == SCHED_RR;
+}
 
 mhe_status live_open(live *l, int32_t n_frames, mhe_error *err) {
     l->memory = calloc(2 * (size_t)n_frames + 1, sizeof(double));
@@ -56,6 +66,11 @@ void live_estimated(live *l) {
 }
 
 void live_end(live *l) {
+    const struct sched_param ordinary = {.sched_priority = 0};
+    if (l->raised) {
+        (void)sched_setscheduler(0, SCHED_OTHER, &ordinary);
+        l->raised = 0;
+    }
     measure_sort(l->latency, l->n_latency);
     measure_sort(l->jitter, l->n_jitter);
 }
@@ -67,9 +82,15 @@ static double ms(const double *sorted, int32_t n, double fraction) {
 void live_lines(const live *l, double rate, mhi_text *out) {
     const double *t = l->latency, *j = l->jitter;
     mhi_text_add(out,
-                 "by the clock: %.1f estimates/s, %d frames missed; latency %.2f ms median, %.2f "
+                 "by the clock%s: %.1f estimates/s, %d frames missed; latency %.2f ms median, %.2f "
                  "p95, %.2f p99, %.2f p99.9, %.2f max; jitter %.3f ms median, %.3f p99, %.3f max\n",
-                 rate, l->n_missed, ms(t, l->n_latency, 0.5), ms(t, l->n_latency, 0.95),
-                 ms(t, l->n_latency, 0.99), ms(t, l->n_latency, 0.999), ms(t, l->n_latency, 1),
-                 ms(j, l->n_jitter, 0.5), ms(j, l->n_jitter, 0.99), ms(j, l->n_jitter, 1));
+                 l->has_priority ? ", with real-time priority" : "", rate, l->n_missed,
+                 ms(t, l->n_latency, 0.5), ms(t, l->n_latency, 0.95), ms(t, l->n_latency, 0.99),
+                 ms(t, l->n_latency, 0.999), ms(t, l->n_latency, 1), ms(j, l->n_jitter, 0.5),
+                 ms(j, l->n_jitter, 0.99), ms(j, l->n_jitter, 1));
+    if (l->n_missed > 0 && !l->has_priority) {
+        mhi_text_add(
+            out, "try: real-time priority, which this user may not take: chrt -f 10 as root, or "
+                 "rtprio in /etc/security/limits.conf\n");
+    }
 }

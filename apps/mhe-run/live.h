@@ -14,13 +14,18 @@ typedef struct live {
     double deadline; /* from a frame to its estimate */
     int32_t next;    /* frame to wait for */
     int32_t n_missed;
-    double arrived;  /* when the frame in work came */
-    double *latency; /* [n_latency] from a frame's coming to its estimate; of `memory` */
-    double *jitter;  /* [n_jitter] from a frame's coming to when it was taken up */
+    int32_t has_priority; /* real-time priority, its own or given: other programs do not delay it */
+    int32_t raised;       /* its own */
+    double arrived;       /* when the frame in work came */
+    double *latency;      /* [n_latency] from a frame's coming to its estimate; of `memory` */
+    double *jitter;       /* [n_jitter] from a frame's coming to when it was taken up */
     int32_t n_latency, n_jitter;
     double *memory;
 } live;
 
+/* Takes real-time priority where the system lets it and none is given; threads made afterwards have
+ * it too. Until live_end. */
+void live_raise(live *l);
 /* For at most n_frames. */
 mhe_status live_open(live *l, int32_t n_frames, mhe_error *err);
 void live_close(live *l);
@@ -30,7 +35,7 @@ void live_close(live *l);
 int32_t live_wait(live *l, mhe_estimator *estimator, const double *time, int32_t n);
 /* The frame's estimate is there. */
 void live_estimated(live *l);
-/* Sorts the times. */
+/* Sorts the times, gives the priority back. */
 void live_end(live *l);
 void live_lines(const live *l, double rate, mhi_text *out); /* after live_end */
 

@@ -40,8 +40,15 @@ static void add_times(cJSON *root, const summary *s) {
     add_number(ms, "max", percentile(s, 1));
 }
 
-/* Where raw EMG was processed: what that takes. The latency is that of what the muscles do: to the
- * estimate, with the window, the filters and a median solve. */
+/* ms from a frame to its estimate: by the clock as it was, else what the solve took. */
+static double latency(const summary *s, double fraction) {
+    return s->live == NULL
+               ? percentile(s, fraction)
+               : 1e3 * measure_percentile(s->live->latency, s->live->n_latency, fraction);
+}
+
+/* Where raw EMG was processed: what that takes. The latency is that from the electrode to the
+ * estimate: filters, window, and the way from the newest frame to the estimate. */
 static void add_emg(cJSON *root, const summary *s) {
     const mhi_emg_report *emg = &s->emg;
     cJSON *o = cJSON_AddObjectToObject(root, "emg");
@@ -50,7 +57,10 @@ static void add_emg(cJSON *root, const summary *s) {
     add_number(o, "offset_ms", 1e3 * emg->offset);
     add_number(o, "filter_delay_ms", 1e3 * emg->filter_delay);
     add_number(o, "lag_ms", 1e3 * emg->lag);
-    add_number(o, "latency_ms", 1e3 * (s->info.delay + emg->lag) + percentile(s, 0.5));
+    const double before = 1e3 * (s->info.delay + emg->filter_delay);
+    cJSON *latencies = cJSON_AddObjectToObject(o, "latency_ms");
+    add_number(latencies, "p50", before + latency(s, 0.5));
+    add_number(latencies, "p99", before + latency(s, 0.99));
 }
 
 static void add_spread(cJSON *parent, const char *key, const double *sorted_s, int32_t n) {
@@ -66,6 +76,7 @@ static void add_realtime(cJSON *root, const summary *s) {
     const live *l = s->live;
     cJSON *o = cJSON_AddObjectToObject(root, "realtime");
     add_number(o, "deadline_ms", 1e3 * l->deadline);
+    cJSON_AddStringToObject(o, "priority", l->has_priority ? "real-time" : "ordinary");
     add_number(o, "rate_hz", s->tally.n_solves / s->elapsed);
     add_number(o, "missed_frames", l->n_missed);
     add_spread(o, "latency_ms", l->latency, l->n_latency);
@@ -126,6 +137,15 @@ void summary_lines(const summary *s, mhi_text *out) {
         mhi_text_add(out, "rate %.1f Hz mean; solve %.2f ms median, %.2f ms p99, %.2f ms max\n",
                      1e3 / tally_mean_ms(&s->tally), percentile(s, 0.5), percentile(s, 0.99),
                      percentile(s, 1));
+    }
+    if (s->emg.n_channels > 0 && s->tally.n_solves > 0) {
+        const double before = 1e3 * (s->info.delay + s->emg.filter_delay);
+        mhi_text_add(
+            out,
+            "from electrode to estimate: filters %.3g ms, window %.3g ms, then %.2f ms median, "
+            "%.2f ms p99; together %.4g ms (p99)\n",
+            1e3 * s->emg.filter_delay, 1e3 * s->info.delay, latency(s, 0.5), latency(s, 0.99),
+            before + latency(s, 0.99));
     }
     if (s->live != NULL) {
         live_lines(s->live, s->tally.n_solves / s->elapsed, out);

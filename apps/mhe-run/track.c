@@ -39,6 +39,9 @@ static mhe_status open_live(tracking *t, mhe_error *err) {
 
 static mhe_status open_all(tracking *t, mhe_error *err) {
     const track_setup *s = t->setup;
+    if (s->realtime && !s->check_only) {
+        live_raise(&t->live);
+    }
     mhe_status status = mhi_estimator_create(s->run, s->host, &t->estimator, err);
     if (status != MHE_OK) {
         return status;

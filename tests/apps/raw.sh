@@ -29,7 +29,10 @@ grep -qF 'EMG 2000 Hz, markers 100 Hz, grid 100 Hz, offset 0 ms; 9 channels for 
 grep -q "filters' delay is 38.4 ms" raw.txt || fail "the filters' delay: $(cat raw.txt)"
 within raw filter_delay_ms 38.3 38.5
 within raw lag_ms 38.3 38.5
-within raw latency_ms 108.3 1000 # filters, window, and the solve
+grep -q 'from electrode to estimate: filters 38.4 ms, window 70 ms, then' raw.txt || fail "the latency: $(cat raw.txt)"
+awk '/"latency_ms"/ {seen = 1} seen && /"p50"/ {gsub(/[^0-9.]/, "", $2); low = $2}
+     seen && /"p99"/ {gsub(/[^0-9.]/, "", $2); high = $2; exit} END {exit !(low > 108.3 && high >= low && high < 5000)}' \
+    raw/summary.json || fail "emg.latency_ms: $(grep -A 3 '"latency_ms"' raw/summary.json)"
 within raw q_deg 0.11 0.133
 within raw force_n 5.6 6.84
 within raw marker_mm 0.44 0.54

@@ -29,14 +29,15 @@ static void expect_ok(mhe_status status, const mhe_error *err) {
 }
 
 /* The shipped config in a folder of its own, beside a link to the data. */
-static void read_config(track *t, const char *data, const char *const *set, int32_t n_set) {
+static void read_config(track *t, const char *name, const char *data, const char *const *set,
+                        int32_t n_set) {
     char folder[] = "/tmp/mhe-recording-XXXXXX", config[64], link[64], command[1500];
     mhe_error err = {0};
     assert_non_null(mkdtemp(folder));
     (void)snprintf(link, sizeof link, "%s/abduction", folder);
-    (void)snprintf(config, sizeof config, "%s/abduction.yaml", folder);
-    (void)snprintf(command, sizeof command, "cp %s/models/abduction/abduction.yaml %s",
-                   MHE_TEST_SOURCE_DIR, config);
+    (void)snprintf(config, sizeof config, "%s/%s", folder, name);
+    (void)snprintf(command, sizeof command, "cp %s/models/abduction/%s %s", MHE_TEST_SOURCE_DIR,
+                   name, config);
     assert_int_equal(symlink(data, link), 0);
     assert_int_equal(system(command), 0);
     expect_ok(mhi_registry_create(&track_host, &t->registry, &err), &err);
@@ -48,13 +49,13 @@ static void read_config(track *t, const char *data, const char *const *set, int3
     (void)rmdir(folder);
 }
 
-int track_open(track *t, const char *const *set, int32_t n_set) {
+int track_open(track *t, const char *config, const char *const *set, int32_t n_set) {
     char data[512], file[600];
     memset(t, 0, sizeof *t);
     if (test_data_path(data, sizeof data, "abduction") == NULL) {
         return 0;
     }
-    read_config(t, data, set, n_set);
+    read_config(t, config, data, set, n_set);
     (void)snprintf(file, sizeof file, "%s/wu_scaled.bioMod", data);
     t->run->model_file.file = mhi_arena_text(&t->run->arena, file);
     assert_true(t->model->n_coordinates <= 64 && t->model->n_muscles <= 64);

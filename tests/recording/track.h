@@ -25,8 +25,9 @@ typedef struct track {
 
 extern const mhe_host track_host; /* drops what it is told */
 
-/* Reads config and data with assignments `set` [n_set]; 0: the data are absent. */
-int track_open(track *t, const char *const *set, int32_t n_set);
+/* Reads a shipped config ("abduction.yaml") and its data with assignments `set` [n_set]; 0: the
+ * data are absent. */
+int track_open(track *t, const char *config, const char *const *set, int32_t n_set);
 /* Pushes the piece's frames and keeps what comes out. */
 void track_run(track *t);
 void track_close(track *t);
