@@ -137,7 +137,7 @@ static double largest_multiplier(const rti_solver *s) {
 }
 
 /* The step to the result of a program as the last of a solve. That of a program cut short is taken
- * where it lowers the merit function of the linearised problem. */
+ * where it closes the gaps of the linearised dynamics and lowers its merit function. */
 static int32_t leap(rti_solver *s, int32_t result) {
     rti_leap *leap = &s->leap;
     *leap = (rti_leap){.solved = result == QP_SOLVED, .length = 1};
@@ -153,7 +153,8 @@ static int32_t leap(rti_solver *s, int32_t result) {
             leap->cost = model_cost(s);
             leap->left = model_gaps(s, &sum);
             if (result == QP_LATE &&
-                !(leap->cost + penalty * sum < s->here.cost + penalty * s->gap_sum)) {
+                !(leap->left <= s->config->tolerance &&
+                  leap->cost + penalty * sum < s->here.cost + penalty * s->gap_sum)) {
                 return RTI_LATE;
             }
             leap->taken = 1;

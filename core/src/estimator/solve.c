@@ -10,9 +10,9 @@
 #define FIRST_WEIGHT 100.0 /* of the proximal term on velocities and activations */
 #define FIRST_MOVE 0.02    /* 1, rad/s: so near to its centre the term no longer matters */
 
-/* An unfinished iterate is handed out only if it is a motion of the model: largest jump between
- * intervals that may remain, rad, rad/s, 1. Else its states would start the next window and the
- * error would stay. */
+/* An unfinished iterate is handed out only if something was done to it and it is a motion of the
+ * model: largest jump between intervals that may remain, rad, rad/s, 1. Else its states would start
+ * the next window and the error would stay. */
 #define CONSISTENT 1e-2
 
 static int all_finite(const double *values, ptrdiff_t n) {
@@ -145,7 +145,8 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
     }
     const int finite = all_finite(e->solution.x, (ptrdiff_t)(e->n + 1) * e->n_x) &&
                        all_finite(e->solution.u, (ptrdiff_t)e->n * e->n_u);
-    const int usable = status == MHE_OK && finite && info->primal_residual <= CONSISTENT;
+    const int begun = info->iterations > 0 || info->outcome == MHE_SOLVE_CONVERGED;
+    const int usable = status == MHE_OK && finite && begun && info->primal_residual <= CONSISTENT;
     *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;
     if (*frame_status != MHE_FRAME_PREDICTED) {
         e->restarted = 0;
