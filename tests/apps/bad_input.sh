@@ -145,6 +145,12 @@ END
 }
 raw 'a *= 1000'
 expect emg-in-mv 'are EMG and MVC in the same unit' raw.yaml
+raw ''
+sed -i 's/, mvc: 1e-4//' raw.yaml
+expect emg-without-mvc "raw EMG needs an 'mvc' of each channel" raw.yaml
+raw 'a *= 5e3'
+sed -i '/name: A/s/, mvc: 1e-4//' raw.yaml
+warn emg-one-without-mvc 'without an MVC, whose envelopes are taken as shares of it: A' raw.yaml
 raw 'a /= 1e4; b /= 1e4'
 expect emg-in-kv 'no channel reaches 1 % of its MVC' raw.yaml
 raw ''

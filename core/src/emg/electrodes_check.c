@@ -81,9 +81,21 @@ static void add_peak(mhi_text *list, const char *name, double peak) {
     mhi_text_add(list, "%s%s (%.3g %%)", list->length == 0 ? "" : ", ", name, 100 * peak);
 }
 
+/* Channels whose raw EMG is measured against nothing. */
+static int32_t list_without_mvc(const mhi_run *run, mhi_text *out) {
+    int32_t n = 0;
+    for (int32_t i = 0; i < run->emg.n_channels && run->emg.mvc_file == NULL; i++) {
+        if (run->emg.process && run->emg.channels[i].mvc == 0) {
+            mhi_text_add(out, "%s%s", n++ == 0 ? "" : ", ", run->emg.channels[i].name);
+        }
+    }
+    return n;
+}
+
 mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, const double *peaks,
                                       const mhe_host *host, mhe_error *err) {
-    mhi_text high = {0}, low = {0};
+    mhi_text high = {0}, low = {0}, without = {0};
+    const int32_t n_without = list_without_mvc(run, &without);
     int32_t n_low = 0, n_there = 0, worst = -1;
     for (int32_t i = 0; i < run->emg.n_channels; i++) {
         if (isnan(peaks[i])) {
@@ -100,8 +112,10 @@ mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, co
             n_low++;
         }
     }
-    static const char remedy[] = "are EMG and MVC in the same unit (V, mV, uV), and of the same "
-                                 "processing?";
+    const char *remedy =
+        n_without == run->emg.n_channels
+            ? "raw EMG needs an 'mvc' of each channel, or emg.mvc_file"
+            : "are EMG and MVC in the same unit (V, mV, uV), and of the same processing?";
     mhe_status status = MHE_OK;
     if (worst >= 0) {
         status = mhe_fail(err, MHE_E_INPUT, "%s: channel '%s' reaches %.4g %% of its MVC: %s",
@@ -111,11 +125,14 @@ mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, co
                           remedy);
     }
     if (status == MHE_OK) {
+        tell(host, source, "channels without an MVC, whose envelopes are taken as shares of it",
+             &without);
         tell(host, source, "channels far above their MVC, which may be too small", &high);
         tell(host, source, "channels below 1 % of their MVC, which may be too large", &low);
     }
     mhi_text_free(&high);
     mhi_text_free(&low);
+    mhi_text_free(&without);
     return status;
 }
 
