@@ -69,9 +69,8 @@ typedef struct mhe_frame {
 #define MHE_FRAME_OK 0              /* the solve converged */
 #define MHE_FRAME_ITERATION_LIMIT 1 /* the best iterate after max_iterations */
 #define MHE_FRAME_DEADLINE 2        /* the best iterate at the deadline */
-#define MHE_FRAME_PREDICTED 3 /* the solve failed or got nowhere in time: the model's prediction \
-                               */
-#define MHE_FRAME_RESTARTED 4 /* first solve after the window began again */
+#define MHE_FRAME_PREDICTED 3       /* no usable solve: the model's prediction */
+#define MHE_FRAME_RESTARTED 4       /* first solve after the window began again */
 
 /* Arrays are the estimator's own and valid until its next call; never NaN. */
 typedef struct mhe_estimate {
