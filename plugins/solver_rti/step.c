@@ -11,9 +11,8 @@
 #define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
 #define MOST_DAMPING 1e9
 #define PENALTY 1.5 /* of the gaps, times the largest multiplier */
-#define NEARER                                                                         \
-    0.5 /* part of the least residual so far that a step may leave, whatever its merit \
-         */
+/* Part of the least residual so far that a step may leave, whatever its merit. */
+#define NEARER 0.5
 
 static int32_t is_late(const void *data) {
     const rti_solver *s = data;
