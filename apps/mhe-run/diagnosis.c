@@ -239,6 +239,22 @@ static void marker_lines(const diagnosis *d, mhi_text *out) {
     }
 }
 
+/* How well the muscles follow their EMG, over all that have one. */
+static void emg_line(const diagnosis *d, mhi_text *out) {
+    tally all = {0};
+    int32_t which[NAMED], n_with = 0;
+    for (int32_t i = 0; i < d->info->n_muscles; i++) {
+        all.squares += d->muscles[i].squares;
+        all.n += d->muscles[i].n;
+        n_with += d->muscles[i].n > 0;
+    }
+    if (worst(d->muscles, d->info->n_muscles, 0, which) > 0) {
+        mhi_text_add(
+            out, "EMG and estimate are %.3f apart (RMS, of 1; %d muscles); most: %s %.3f\n",
+            rms(&all), n_with, d->info->muscle_names[which[0]], rms(&d->muscles[which[0]]));
+    }
+}
+
 static void muscle_lines(const diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t n = 0;
@@ -252,6 +268,7 @@ static void muscle_lines(const diagnosis *d, mhi_text *out) {
         mhi_text_add(out, "\ntry: residual torques at their joints, stronger muscles (the person "
                           "may be), or a smaller sigma of the activations\n");
     }
+    emg_line(d, out);
     int32_t which[NAMED];
     n = worst(d->muscles, f->n_muscles, DISAGREES, which);
     for (int32_t i = 0; i < n; i++) {

@@ -26,6 +26,7 @@ run() {
 run raw
 grep -qF 'EMG 2000 Hz, markers 100 Hz, grid 100 Hz, offset 0 ms; 9 channels for 14 muscles' raw.txt ||
     fail "rates, grid and channels: $(cat raw.txt)"
+grep -q 'EMG and estimate are 0\.[0-9]* apart (RMS, of 1; 14 muscles)' raw.txt || fail "EMG and estimate: $(cat raw.txt)"
 grep -q "filters' delay is 38.4 ms" raw.txt || fail "the filters' delay: $(cat raw.txt)"
 within raw filter_delay_ms 38.3 38.5
 within raw lag_ms 38.3 38.5
