@@ -7,14 +7,16 @@
     update.py --to FOLDER ...   the page FOLDER/study.md and tables in FOLDER/study instead
 
 Tables (.csv) and figures go to study/<name of the study without 'study-'>. In the page, what stands between
-"<!-- study NAME -->" and "<!-- /study -->" is replaced by what the functions of compare.py make of the tables.
+"<!-- study NAME -->" and "<!-- /study -->" is replaced by what sections.py and compare.py make of the tables.
 """
 import os
 import re
 import shutil
 import sys
 
-import compare
+sys.dont_write_bytecode = True
+import compare  # noqa: E402
+import sections  # noqa: E402
 
 BLOCK = re.compile(r"<!-- study ([a-z-]+) -->\n.*?<!-- /study -->", re.DOTALL)
 
@@ -39,9 +41,9 @@ def take(folder, to):
 def filled(page, tables):
     def replace(match):
         name = match.group(1)
-        if name not in compare.BLOCKS:
-            raise OSError(f"study.md: unknown block '{name}' (valid: {', '.join(sorted(compare.BLOCKS))})")
-        return f"<!-- study {name} -->\n{compare.block(name, tables)}<!-- /study -->"
+        if name not in sections.BLOCKS:
+            raise OSError(f"study.md: unknown block '{name}' (valid: {', '.join(sorted(sections.BLOCKS))})")
+        return f"<!-- study {name} -->\n{sections.block(name, tables)}<!-- /study -->"
 
     return BLOCK.sub(replace, page)
 

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The blocks of the page: tables in Markdown of what mhe-study report made, by the names that the page calls them."""
+import sys
+
+from compare import EMG_LEVELS, LEVELS, STATEMENTS, TRACKING, Missing, Study, WrongTable, number, table
+
+
+def verdicts(part):
+    def block(folder):
+        rows = []
+        for statement in STATEMENTS[part]:
+            try:
+                rows.append(statement(folder))
+            except Missing:
+                continue
+            except WrongTable as why:  # a shortened study
+                print(f"left out: {statement.__name__}: {why}", file=sys.stderr)
+        return table(["paper", "here", "verdict"], rows) if rows else ""
+    return block
+
+
+# ---- tables of the sections ----
+
+def rates(folder):
+    rows = Study(folder, "window").rows(ratios=["authors", "every"])
+    return table(["formulation", "window", "every nth sample", "rate (Hz)", "q (deg)", "force (N)", "markers (mm)"],
+                 [[r["formulation"], *r["horizon"].split("/"), f"{r['rate_hz']:.0f}", number(r["q_deg"]), number(r["force_n"]),
+                   number(r["marker_mm"])] for r in rows])
+
+
+def forces(folder):
+    study = Study(folder, "noise")
+    objectives = study.levels("emg_objective", [*TRACKING, "minimise"])
+    labels = study.levels("cocontraction", LEVELS)
+    own = [number(r["force_n"]) for r in study["motions"]]
+    return table(["co-contraction", *(f"tracking, EMG noise {o}" if o != "minimise" else o for o in objectives),
+                  "the co-contraction's own forces"],
+                 [[c, *(study.cell("force_n", cocontraction=c, emg_objective=o) for o in objectives), f]
+                  for c, f in zip(labels, own)])
+
+
+def angles(folder):
+    study = Study(folder, "noise")
+    objectives = study.levels("emg_objective", [*TRACKING, "minimise"])
+    return table(["marker weight", "marker noise", *(f"tracking, EMG noise {o}" if o != "minimise" else o for o in objectives)],
+                 [[w, m, *(study.cell("q_deg", weight=w, marker_noise=m, emg_objective=o) for o in objectives)]
+                  for w in ("high", "low") for m in study.levels("marker_noise", LEVELS)])
+
+
+def anova(name):
+    def block(folder):
+        return table(["source", "df", "F", "p", "partial η²"],
+                     [[r["source"], f"{r['df']:.0f}", number(r["F"]) if r["F"] != "" else "",
+                       "" if r["p"] == "" else "< 0.001" if r["p"] < 0.001 else f"{r['p']:.3f}",
+                       number(r["eta_sq_partial"]) if r["eta_sq_partial"] != "" else ""]
+                      for r in Study(folder, "noise")[f"anova-{name}"]])
+    return block
+
+
+def runs(folder):
+    rows = []
+    for name in ("noise", "window", "muscles", "emg-subset", "emg-level", "limits", "muscles-limits"):
+        try:
+            s = Study(folder, name)["summary"][0]
+        except Missing:
+            continue
+        rows.append([name, f"{s['trials']:.0f} of {s['planned']:.0f}", f"{s['solves']:.0f}", f"{s['converged_mean']:.2f} %",
+                     f"{s['seconds'] / 60:.1f}", f"{s['peak_rss_mb']:.0f}", str(s["processor"]), str(s["version"])])
+    return table(["study", "trials", "solves", "converged", "minutes of workers", "most memory of a worker (MB)", "processor",
+                  "version"], rows) if rows else ""
+
+
+def subset(folder):
+    study = Study(folder, "emg-subset")
+    noise = study.levels("emg_noise", LEVELS)
+    return table(["co-contraction", "electrodes", *(f"EMG noise {e}" for e in noise)],
+                 [[c, w, *(study.cell("force_n", cocontraction=c, electrodes=w, emg_noise=e) for e in noise)]
+                  for c in study.levels("cocontraction", LEVELS) for w in ("all", "subset")])
+
+
+def emg_level(folder):
+    study = Study(folder, "emg-level")
+    objectives = study.levels("emg_objective", EMG_LEVELS)
+    return table(["marker noise", *(f"tracking, EMG noise {number(o)}" if o != "minimise" else o for o in objectives)],
+                 [[m, *(study.cell("q_deg", marker_noise=m, emg_objective=o) for o in objectives)]
+                  for m in study.levels("marker_noise", LEVELS)])
+
+
+def limits(folder):
+    return table(["formulation", "passive force", "tolerance", "EMG delay (samples)", "q (deg)", "force (N)", "markers (mm)"],
+                 [[r["formulation"], r["passive_force"], f"{r['tolerance']:.0e}".replace("e-0", "e-"), number(r["emg_delay"]),
+                   *(number(r[e]) for e in ("q_deg", "force_n", "marker_mm"))] for r in Study(folder, "limits").rows()])
+
+
+def muscles_limits(folder):
+    return table(["passive force", "window", "every nth sample", "converged", "q (deg)", "force (N)", "markers (mm)"],
+                 [[r["passive_force"], *r["horizon"].split("/"), f"{100 * r['converged']:.1f} %", number(r["q_deg"]),
+                   number(r["force_n"]), number(r["marker_mm"])] for r in Study(folder, "muscles-limits").rows()])
+
+
+BLOCKS = {
+    "verdicts-windows": verdicts("windows"), "verdicts-noise": verdicts("noise"), "rates": rates, "forces": forces,
+    "angles": angles, "anova-force": anova("force"), "anova-angles": anova("angles"), "runs": runs, "subset": subset,
+    "emg-level": emg_level, "limits": limits,
+    "muscles-limits": muscles_limits,
+}
+
+
+def block(name, folder):
+    """Markdown of a block; nothing where its study has no tables."""
+    try:
+        return BLOCKS[name](folder)
+    except Missing:
+        return ""
