@@ -3,12 +3,18 @@
 
 #include <signal.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
+
+/* ns. A signal this soon after another is the same one: `timeout` and some shells send it to the
+ * process and to its group, in one go. */
+#define ECHO 300000000LL
 
 static const int signals[] = {SIGINT, SIGTERM, SIGALRM};
 #define N_SIGNALS ((int)(sizeof signals / sizeof signals[0]))
 
-static atomic_int asked;
+static atomic_int asked, asked_at_last;
+static atomic_llong heard; /* the last that was no echo, ns of CLOCK_MONOTONIC */
 static const mhi_outbox *outbox;
 static struct sigaction before[N_SIGNALS];
 
@@ -21,8 +27,25 @@ static void leave(void) {
     _exit(1);
 }
 
+static int is_echo(void) {
+    struct timespec now;
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    const long long ns = now.tv_sec * 1000000000LL + now.tv_nsec;
+    if (asked && ns - heard < ECHO) {
+        return 1;
+    }
+    heard = ns;
+    return 0;
+}
+
 static void on_signal(int number) {
-    if (number == SIGALRM || asked) {
+    if (number == SIGALRM) {
+        leave();
+    }
+    if (is_echo()) {
+        return;
+    }
+    if (asked) {
         leave();
     }
     asked = 1;
@@ -30,15 +53,20 @@ static void on_signal(int number) {
 }
 
 static void on_last_signal(int number) {
-    (void)number;
-    asked = 1;
+    if (is_echo()) {
+        return;
+    }
+    if (asked_at_last) { /* takes its usual effect once this handler has returned */
+        (void)signal(number, SIG_DFL);
+        (void)raise(number);
+    }
+    asked = asked_at_last = 1;
 }
 
-static void handle(void (*handler)(int), int flags, struct sigaction *old) {
+static void handle(void (*handler)(int), struct sigaction *old) {
     struct sigaction action;
     memset(&action, 0, sizeof action);
     action.sa_handler = handler;
-    action.sa_flags = flags;
     for (int i = 0; i < N_SIGNALS; i++) { /* one at a time: the handler is not interrupted */
         (void)sigaddset(&action.sa_mask, signals[i]);
     }
@@ -49,7 +77,7 @@ static void handle(void (*handler)(int), int flags, struct sigaction *old) {
 
 void interrupt_begin(const mhi_outbox *files) {
     outbox = files;
-    handle(on_signal, 0, before);
+    handle(on_signal, before);
 }
 
 const atomic_int *interrupt_asked(void) {
@@ -57,12 +85,12 @@ const atomic_int *interrupt_asked(void) {
 }
 
 void interrupt_settle(void) {
-    handle(on_last_signal, (int)SA_RESETHAND, NULL);
+    handle(on_last_signal, NULL);
     (void)alarm(0);
 }
 
 void interrupt_end(void) {
-    for (int i = 0; i < N_SIGNALS; i++) {
+    for (int i = 0; i < N_SIGNALS && !asked; i++) { /* else the program ends; echoes may be late */
         (void)sigaction(signals[i], &before[i], NULL);
     }
 }

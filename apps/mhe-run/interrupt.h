@@ -3,7 +3,8 @@
  *
  * The first asks: the solve in work ends at its next evaluation, and what was estimated until then
  * is written. A plugin that never comes back is left after INTERRUPT_GRACE seconds, or at once by a
- * second signal: the program then ends with status 1 and without a file. */
+ * second signal that is no mere echo of the first: the program then ends with status 1 and without
+ * a file. */
 #ifndef INTERRUPT_H
 #define INTERRUPT_H
 
@@ -20,7 +21,8 @@ const atomic_int *interrupt_asked(void);
 /* The frames are done, the files are being written: this is brief and is not broken off, but by a
  * second signal. */
 void interrupt_settle(void);
-/* Signals do what they did before interrupt_begin. */
+/* Signals do what they did before interrupt_begin, unless one has come: then the program is to end
+ * of itself. */
 void interrupt_end(void);
 
 #endif

@@ -37,6 +37,17 @@ ended live 'interrupted after' 9
 rows=$(sed -n 's/^nRows=//p' live/estimates.sto)
 [ "$(sed '1,/endheader/d' live/estimates.sto | tail -n +2 | wc -l)" -eq "$rows" ] || fail "estimates.sto is not whole"
 
+# The same signal twice in one go, as programs that watch over others send it, is one signal.
+"$run" "$demo" --quiet --out twice --realtime --set output.picture=false > out.txt 2> err.txt &
+pid=$!
+until [ -e twice/.quality.sto.tmp ] || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
+sleep 1
+kill -TERM $pid
+kill -TERM $pid
+wait $pid
+status=$?
+ended twice 'interrupted after' 9
+
 # In a solve that takes long: 7 intervals of 10 000 steps, iteration by iteration.
 interrupted slow --set integrator.max_step=3e-6
 ended slow 'interrupted' 0
