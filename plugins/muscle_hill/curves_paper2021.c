@@ -59,4 +59,5 @@ static void paper_prepare(const mhe_muscle *muscle, const struct hill_config *co
     out->passive_scale = thelen ? 1 / expm1(5) : exp(-5);
 }
 
-const struct hill_curve_set hill_paper2021 = {.name = "paper2021", .prepare = paper_prepare};
+const struct hill_curve_set hill_paper2021 = {
+    .name = "paper2021", .jumps = 1, .prepare = paper_prepare};

@@ -59,6 +59,7 @@ struct hill_muscle {
 struct hill_curve_set {
     const char *name;
     int32_t published; /* takes the overrides `damping` and `vmax` */
+    int32_t jumps;     /* its passive force does, and takes `passive_ramp` */
     void (*prepare)(const mhe_muscle *muscle, const struct hill_config *config,
                     struct hill_muscle *out);
 };

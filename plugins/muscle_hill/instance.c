@@ -71,7 +71,7 @@ static mhe_status hill_check_config(const mhe_host *host, const struct hill_conf
         return mhe_fail(err, MHE_E_CONFIG, "%s: the curves %s fix it; leave the option out",
                         config->vmax > 0 ? "vmax" : "damping", set->name);
     }
-    if (set != &hill_paper2021 && config->passive_ramp > 0) {
+    if (!set->jumps && config->passive_ramp > 0) {
         return mhe_fail(err, MHE_E_CONFIG,
                         "passive_ramp: the curves %s do not switch the passive force on; leave the "
                         "option out",

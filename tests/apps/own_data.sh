@@ -7,15 +7,7 @@ set -u
 run=$1
 readme=$2/README.md
 demo=$2/models/arm19
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
+. "$(dirname "$0")/../support/script.sh"
 
 # block 'LINE BEFORE': the indented block that follows it in the README, without its indent
 block() {
@@ -60,5 +52,4 @@ estimate some
 estimate raw
 grep -q '2 channels for 3 muscles' raw.txt || fail "raw: $(cat raw.txt)"
 
-[ "$failed" -eq 0 ] && echo ok
-[ "$failed" -eq 0 ]
+finish "own data"

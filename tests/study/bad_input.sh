@@ -4,9 +4,7 @@
 #   bad_input.sh PATH/mhe-study SOURCE_DIR
 set -u
 study=$1 source=$2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$source/tests/support/script.sh"
 . "$source/tests/study/small.sh"
 count=0
 

@@ -5,9 +5,7 @@
 #   kill.sh PATH/mhe-study SOURCE_DIR
 set -u
 study=$1 source=$2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$source/tests/support/script.sh"
 . "$source/tests/study/small.sh"
 RANDOM=${MHE_TEST_SEED:-$$}
 echo "MHE_TEST_SEED=$RANDOM repeats the moments"
@@ -95,5 +93,4 @@ status=$?
 [ ! -e cut/results.csv ] || fail "tables of an interrupted study"
 compare cut
 
-[ $failed -eq 0 ] && echo "kill: all as it should be"
-[ $failed -eq 0 ]
+finish "kill"

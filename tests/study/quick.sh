@@ -5,15 +5,8 @@
 #   quick.sh PATH/mhe-study SOURCE_DIR
 set -u
 study=$1 source=$2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$source/tests/support/script.sh"
 export XDG_CACHE_HOME="$work/cache"
-failed=0
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
 
 for file in "$source"/models/arm*/studies/study-*.yaml; do
     "$study" run --check "$file" > out.txt 2> err.txt || fail "--check $file: $(cat err.txt)"
@@ -85,5 +78,4 @@ if [ $reports -eq 1 ]; then
     [ $status -eq 2 ] && grep -q 'study.id:4' err.txt || fail "a changed study: $status, $(cat err.txt)"
 fi
 
-[ $failed -eq 0 ] && echo "quick: all as it should be"
-[ $failed -eq 0 ]
+finish "quick"

@@ -4,13 +4,9 @@
 #   run.sh BIN_DIR SOURCE_DIR
 set -u
 bin=$1 source=$2
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
+. "$source/tests/support/script.sh"
 . "$source/tests/study/small.sh"
 
-# number KEY of summary.json, the first of that name
-number() { sed -n "s/.*\"$1\":[[:space:]]*\\([-0-9.e]*\\).*/\\1/p" "$2/summary.json" | head -n 1; }
 # cell FILE LINE COLUMN
 cell() {
     awk -F, -v line="$2" -v name="$3" 'NR == 1 { for (i = 1; i <= NF; i++) { at[$i] = i } }
@@ -84,5 +80,4 @@ awk -F, 'NR == 2 { for (i = 1; i <= NF; i++) { if ($i == "ok") { exit !($(i + 1)
 # Memory and locks.
 awk -F, 'NR > 1 && $NF > 150 { exit 1 }' one/timing.csv || fail "a worker takes more than 150 MB"
 
-[ $failed -eq 0 ] && echo "study: all as it should be"
-[ $failed -eq 0 ]
+finish "study"

@@ -14,20 +14,19 @@ skip() {
 for program in munged slurmctld slurmd sbatch squeue scontrol; do
     command -v $program > /dev/null || skip "$program is not installed (slurm-wlm)"
 done
-work=$(mktemp -d)
+. "$source/tests/support/script.sh"
 chmod 755 "$work"
-cd "$work" || exit 1
 . "$source/tests/study/small.sh"
 pids=()
 # Ends what was started here, and nothing else.
-finish() {
+end_all() {
     for pid in "${pids[@]}"; do
         kill "$pid" 2> /dev/null
     done
     wait
     rm -rf "$work"
 }
-trap finish EXIT
+trap end_all EXIT
 
 # ---- a cluster of this machine ----
 
@@ -138,5 +137,4 @@ cp cluster/results.csv before.csv
 "$study" merge cluster > out.txt 2> err.txt || fail "merge: $(cat err.txt)"
 cmp before.csv cluster/results.csv || fail "merging changes the results"
 
-[ $failed -eq 0 ] && echo "slurm: all as it should be"
-[ $failed -eq 0 ]
+finish "slurm"

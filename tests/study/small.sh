@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# small.sh: a study whose trials take a moment, for the tests beside it; sourced with $source set.
-failed=0
-fail() {
-    echo "FAILED $*"
-    failed=$((failed + 1))
-}
+# small.sh: a study whose trials take a moment, for the tests beside it; sourced after script.sh, with $source set.
 
 # The demo's first 0.9 s.
 sed -e 's/^nRows=.*/nRows=91/' -e '99,$d' "$source/models/arm19/demo_reference.sto" > motion.sto

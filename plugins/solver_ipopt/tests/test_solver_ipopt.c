@@ -199,13 +199,7 @@ static void test_real_size(void **state) {
     for (int i = 8; i < TOY_ARM_X; i++) {
         x[0][i] = 0.2;
     }
-    for (int k = 0; k <= FRAMES; k++) {
-        double u[TOY_ARM_U];
-        toy_arm_truth(k * dt, u);
-        toy_step(&t, x[k], u, x[k + 1], NULL, NULL);
-        toy_arm_markers(x[k], target[k]);
-        memcpy(target[k] + TOY_ARM_TARGET - TOY_ARM_U, u, sizeof u);
-    }
+    toy_arm_motion(&t, FRAMES + 1, x[0], target[0]);
     memcpy(toy_x_lower(&t, 0), x[0], sizeof x[0]);
     memcpy(toy_x_upper(&t, 0), x[0], sizeof x[0]);
     assert_int_equal(rig_open(&r, &t, "{}"), MHE_OK);

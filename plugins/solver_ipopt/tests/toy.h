@@ -65,8 +65,8 @@ void toy_pendulum(toy *t, int n_intervals);
 #define TOY_ARM_U 19
 #define TOY_ARM_TARGET 43
 void toy_arm(toy *t, int n_intervals, double dt);
-/* Excitations of the true motion at `time`, and the markers of a state. */
-void toy_arm_truth(double time, double *u);
-void toy_arm_markers(const double *x, double *marker);
+/* The true motion from the state in row 0 of x [(n + 1) x TOY_ARM_X], whose other rows are filled;
+ * markers and excitations of its first n nodes -> target [n x TOY_ARM_TARGET]. */
+void toy_arm_motion(const toy *t, int n, double *x, double *target);
 
 #endif

@@ -95,13 +95,7 @@ static double marker(int i, const double *q, double *by_q) {
     return length * sin(phase);
 }
 
-void toy_arm_markers(const double *x, double *out) {
-    for (int i = 0; i < 3 * N_MARKER; i++) {
-        out[i] = marker(i, x, NULL);
-    }
-}
-
-void toy_arm_truth(double time, double *u) {
+static void arm_excitations(double time, double *u) {
     for (int m = 0; m < N_M; m++) {
         double wave = 0.2 + 0.25 * sin(2 * acos(-1) * time * (0.5 + 0.03 * m) + m);
         u[m] = wave > 0.01 ? wave : 0.01;
@@ -172,5 +166,16 @@ void toy_arm(toy *t, int n_intervals, double dt) {
             toy_u_lower(t, k)[m] = 0;
             toy_u_upper(t, k)[m] = 1;
         }
+    }
+}
+
+void toy_arm_motion(const toy *t, int n, double *x, double *target) {
+    for (int k = 0; k < n; k++, x += TOY_ARM_X, target += TOY_ARM_TARGET) {
+        double *u = target + TOY_ARM_TARGET - TOY_ARM_U;
+        for (int i = 0; i < 3 * N_MARKER; i++) {
+            target[i] = marker(i, x, NULL);
+        }
+        arm_excitations(k * t->dt, u);
+        toy_step(t, x, u, x + TOY_ARM_X, NULL, NULL);
     }
 }

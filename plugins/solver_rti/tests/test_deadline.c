@@ -31,21 +31,6 @@ MHE_EXPORT int clock_gettime(clockid_t id, struct timespec *time) {
 
 static double targets[N + 1 + WINDOWS][TOY_ARM_TARGET];
 
-/* Markers and excitations of a motion of the arm. */
-static void move(void) {
-    toy t;
-    double x[TOY_ARM_X] = {0}, u[TOY_ARM_U], next[TOY_ARM_X];
-    toy_arm(&t, N, 0.03);
-    for (int k = 0; k < N + 1 + WINDOWS; k++) {
-        toy_arm_truth(k * 0.03, u);
-        toy_arm_markers(x, targets[k]);
-        memcpy(targets[k] + TOY_ARM_TARGET - TOY_ARM_U, u, sizeof u);
-        toy_step(&t, x, u, next, NULL, NULL);
-        memcpy(x, next, sizeof x);
-    }
-    toy_free(&t);
-}
-
 /* One solve of the last window, from the same start each time. */
 typedef struct solve {
     double values[VALUES];
@@ -161,7 +146,11 @@ static void sweep(const char *yaml, int cold, tally *t) {
 static void cut_anywhere(void **state) {
     (void)state;
     static const char *const presets[] = {"{preset: speed}", "{preset: balanced}", "{}"};
-    move();
+    static double x[N + 2 + WINDOWS][TOY_ARM_X];
+    toy arm;
+    toy_arm(&arm, N, 0.03);
+    toy_arm_motion(&arm, N + 1 + WINDOWS, x[0], targets[0]);
+    toy_free(&arm);
     for (int i = 0; i < 3; i++) {
         for (int cold = 0; cold < (i == 2 ? 2 : 1); cold++) { /* cold, all are as robust */
             tally t;

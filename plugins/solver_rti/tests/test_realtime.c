@@ -22,23 +22,6 @@ typedef struct history {
 
 static history reference, other;
 
-/* Markers and excitations of a motion of the arm. */
-static const double *motion(void) {
-    static double target[N + 1 + WINDOWS][TOY_ARM_TARGET];
-    toy t;
-    double x[TOY_ARM_X] = {0}, u[TOY_ARM_U], next[TOY_ARM_X];
-    toy_arm(&t, N, 0.03);
-    for (int k = 0; k < N + 1 + WINDOWS; k++) {
-        toy_arm_truth(k * 0.03, u);
-        toy_arm_markers(x, target[k]);
-        memcpy(target[k] + TOY_ARM_TARGET - TOY_ARM_U, u, sizeof u);
-        toy_step(&t, x, u, next, NULL, NULL);
-        memcpy(x, next, sizeof x);
-    }
-    toy_free(&t);
-    return target[0];
-}
-
 typedef struct plan {
     const char *yaml;
     int workers;
@@ -58,15 +41,16 @@ static void prepare(rig *r, int how) {
 }
 
 static void run(const plan *p, history *h) {
-    const double *target = motion();
+    static double x[N + 2 + WINDOWS][TOY_ARM_X], target[N + 1 + WINDOWS][TOY_ARM_TARGET];
     toy t;
     rig r;
     memset(h, 0, sizeof *h);
     toy_arm(&t, N, 0.03);
+    toy_arm_motion(&t, N + 1 + WINDOWS, x[0], target[0]);
     t.problem.n_workers = p->workers;
     assert_int_equal(rig_open(&r, &t, p->yaml), MHE_OK);
     for (int k = 0; k < WINDOWS; k++) {
-        t.target = target + k * TOY_ARM_TARGET;
+        t.target = target[k];
         prepare(&r, p->prepares);
         t.steps = 0;
         assert_int_equal(rig_solve(&r, NULL), MHE_OK);
