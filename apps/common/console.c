@@ -2,6 +2,7 @@
 #include "console.h"
 
 #include <mhe/version.h>
+#include <signal.h>
 #include <string.h>
 
 static void log_line(const mhe_host *host, int32_t level, const char *text) {
@@ -17,6 +18,7 @@ static const void *no_service(const mhe_host *host, const char *id) {
 }
 
 mhe_host console_host(const char *program) {
+    (void)signal(SIGXFSZ, SIG_IGN); /* a file at its limit is a failed write, which is told */
     union {
         const char *text;
         void *data;

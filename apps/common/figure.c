@@ -2,7 +2,7 @@
 /* figure.c: the script's file, and the run of gnuplot. */
 #include "figure.h"
 
-#include "io/sink.h"
+#include "io/outbox.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -13,29 +13,26 @@
 
 extern char **environ;
 
-static mhe_status write_script(const figure *f, const char *dir, mhe_error *err) {
+static mhe_status write_script(const figure *f, mhi_outbox *outbox, mhe_error *err) {
     mhi_text script = {0}, file = {0};
-    mhi_outbox *outbox = NULL;
     figure_script(f, &script);
     mhi_text_add(&file, "%s.gp", f->name);
-    mhe_status status = script.failed || file.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                                     : mhi_outbox_open(dir, &outbox, err);
-    if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, file.data, script.data, err);
-    }
+    mhe_status status = script.failed || file.failed
+                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                            : mhi_outbox_text(outbox, file.data, script.data, err);
     if (status == MHE_OK) {
         status = mhi_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
     mhi_text_free(&script);
     mhi_text_free(&file);
     return status;
 }
 
-/* Runs gnuplot without a shell, its streams closed. */
-static mhe_status run_gnuplot(const figure *f, const char *dir, mhe_error *err) {
+/* Runs gnuplot without a shell. It draws into its standard output, which is our file: gnuplot
+ * itself opens no name in the folder for writing. */
+static mhe_status run_gnuplot(const figure *f, const char *dir, int picture, mhe_error *err) {
     mhi_text command = {0};
-    mhi_text_add(&command, "cd '");
+    mhi_text_add(&command, FIGURE_DIRECT " = 1; cd '");
     for (const char *c = dir; *c != '\0'; c++) {
         mhi_text_add(&command, *c == '\'' ? "''" : "%c", *c);
     }
@@ -45,10 +42,9 @@ static mhe_status run_gnuplot(const figure *f, const char *dir, mhe_error *err) 
         mhi_text_free(&command);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    for (int stream = 0; stream < 3; stream++) {
-        (void)posix_spawn_file_actions_addopen(&actions, stream, "/dev/null",
-                                               stream == 0 ? O_RDONLY : O_WRONLY, 0);
-    }
+    (void)posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    (void)posix_spawn_file_actions_adddup2(&actions, picture, STDOUT_FILENO);
+    (void)posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
     char program[] = "gnuplot", defaults[] = "-d", execute[] = "-e";
     char *arguments[] = {program, defaults, execute, command.data, NULL};
     pid_t child = -1;
@@ -72,7 +68,37 @@ static mhe_status run_gnuplot(const figure *f, const char *dir, mhe_error *err) 
     return MHE_OK;
 }
 
+/* An older picture beside the new script would be taken for its own. */
+static void remove_picture(const char *dir, const char *name) {
+    mhi_text path = {0};
+    mhi_text_add(&path, "%s/%s", dir, name);
+    if (!path.failed) {
+        (void)unlink(path.data);
+    }
+    mhi_text_free(&path);
+}
+
 mhe_status figure_draw(const figure *f, const char *dir, mhe_error *err) {
-    mhe_status status = write_script(f, dir, err);
-    return status == MHE_OK ? run_gnuplot(f, dir, err) : status;
+    char name[64];
+    mhi_outbox *outbox = NULL;
+    mhi_outbox_file *picture = NULL;
+    (void)snprintf(name, sizeof name, "%s.svg", f->name);
+    mhe_status status = mhi_outbox_open(dir, &outbox, err);
+    if (status == MHE_OK) {
+        status = write_script(f, outbox, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_add(outbox, name, &picture, err);
+    }
+    if (status == MHE_OK) {
+        status = run_gnuplot(f, dir, fileno(picture->stream), err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_commit(outbox, err);
+    }
+    if (status != MHE_OK) {
+        remove_picture(dir, name);
+    }
+    mhi_outbox_close(outbox);
+    return status;
 }

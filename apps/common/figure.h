@@ -6,6 +6,8 @@
 
 #include "base/text.h"
 
+#define FIGURE_DIRECT "to_standard_output" /* a gnuplot variable: set, no file is opened */
+
 #define FIGURE_BLOCKS_MAX 2
 #define FIGURE_PANELS_MAX 20
 #define FIGURE_SERIES_MAX 5
@@ -57,7 +59,8 @@ typedef struct figure {
 void figure_script(const figure *f, mhi_text *script);
 
 /* Writes dir/<name>.gp, which can be edited and run again, and makes dir/<name>.svg of it.
- * MHE_E_UNSUPPORTED: gnuplot is not installed; the script is there. [cold] */
+ * MHE_E_UNSUPPORTED: gnuplot is not installed; the script is there, a picture of an earlier run is
+ * not. [cold] */
 mhe_status figure_draw(const figure *f, const char *dir, mhe_error *err);
 
 #endif

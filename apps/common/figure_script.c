@@ -115,7 +115,8 @@ static void add_look(mhi_text *script, const figure *f, int32_t height) {
     mhi_text_add(script,
                  "# Made by %s. Change and run it again: gnuplot %s.gp\n"
                  "set terminal svg size %d,%d enhanced font 'Helvetica,Arial,sans-serif,12' "
-                 "background rgb 'white'\nset output '%s.svg'\n",
+                 "background rgb 'white'\n"
+                 "if (!exists('" FIGURE_DIRECT "')) set output '%s.svg'\n",
                  f->program, f->name, WIDTH, height, f->name);
     mhi_text_add(script, "set style line 1 lc rgb '#1b6ca8' lw 1.8\n"
                          "set style line 2 lc rgb '#d1495b' lw 1.8 dt (8,5)\n"

@@ -90,10 +90,10 @@ static int write_table(mat_t *mat, const matlab_table *t) {
     return failed;
 }
 
-/* By the temporary name: the outbox syncs and renames what is there. */
+/* By the name of the open file: the outbox syncs and renames what is there. */
 static mhe_status complete(mhi_outbox_file *file, mhe_error *err) {
     const matlab *m = file->owner;
-    mat_t *mat = Mat_CreateVer(file->temporary, NULL, MAT_FT_MAT5);
+    mat_t *mat = Mat_CreateVer(file->open_path, NULL, MAT_FT_MAT5);
     int failed = mat == NULL;
     for (const matlab_table *t = m->first; t != NULL && !failed; t = t->next) {
         failed = write_table(mat, t);

@@ -8,6 +8,15 @@
 
 #define MOST_SINKS 2
 
+/* Also what picture.c, report.c and summary.c write. */
+const char *const results_names[] = {
+    "estimates.sto", "estimates.csv", "motion.sto",   "forces.sto",  "forces.csv",
+    "torques.sto",   "torques.csv",   "markers.trc",  "markers.csv", "marker_residuals.sto",
+    "emg.sto",       "emg.csv",       "quality.sto",  "quality.csv", "marker_residuals.csv",
+    "results.mat",   "config.yaml",   "summary.json", "report.html", "estimates.gp",
+    "estimates.svg"};
+const int32_t results_n_names = (int32_t)(sizeof results_names / sizeof results_names[0]);
+
 /* One table in all its formats. */
 typedef struct series {
     mhi_sink *sinks[MOST_SINKS];

@@ -10,6 +10,10 @@
 
 typedef struct results results;
 
+/* Every file that a run may leave in its folder. */
+extern const char *const results_names[];
+extern const int32_t results_n_names;
+
 /* Opens estimates, forces, torques, marker_residuals, emg and quality (.sto), markers.trc and
  * motion.sto in the outbox; with "csv" among the formats the same as .csv, with "mat" in
  * results.mat. Markers there are in m.

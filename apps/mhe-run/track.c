@@ -37,12 +37,45 @@ static mhe_status open_live(tracking *t, mhe_error *err) {
     return live_open(&t->live, t->recording->n_frames, err);
 }
 
+/* Before anything else: a folder that cannot be written to is told at once, not after the run. */
+static mhe_status claim_folder(tracking *t, mhe_error *err) {
+    const mhi_run *run = t->setup->run;
+    const mhi_data_section *d = &run->data;
+    const char *const inputs[] = {run->path, run->model_file.file, d->markers,       d->emg,
+                                  d->angles, d->reference,         run->emg.mvc_file};
+    mhe_status status = mhi_outbox_open(t->setup->out, &t->outbox, err);
+    if (status == MHE_OK) {
+        status = mhi_outbox_claim(t->outbox, results_names, results_n_names, err);
+    }
+    for (size_t i = 0; i < sizeof inputs / sizeof inputs[0] && status == MHE_OK; i++) {
+        status = mhi_outbox_spare(t->outbox, inputs[i], err);
+    }
+    return status;
+}
+
+/* What of an earlier run lies among, or in the place of, this one's results. */
+static void tell_stale(const tracking *t) {
+    mhi_text names = {0}, line = {0};
+    if (mhi_outbox_stale(t->outbox, &names) > 0 && !names.failed) {
+        mhi_text_add(&line, "%s: of an earlier run, not of this one: %s", t->setup->out,
+                     names.data);
+    }
+    if (line.data != NULL && !line.failed) {
+        t->setup->host->log(t->setup->host, MHE_LOG_WARNING, line.data);
+    }
+    mhi_text_free(&names);
+    mhi_text_free(&line);
+}
+
 static mhe_status open_all(tracking *t, mhe_error *err) {
     const track_setup *s = t->setup;
     if (s->realtime && !s->check_only) {
         live_raise(&t->live);
     }
-    mhe_status status = mhi_estimator_create(s->run, s->host, &t->estimator, err);
+    mhe_status status = s->check_only ? MHE_OK : claim_folder(t, err);
+    if (status == MHE_OK) {
+        status = mhi_estimator_create(s->run, s->host, &t->estimator, err);
+    }
     if (status != MHE_OK) {
         return status;
     }
@@ -62,9 +95,6 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         t->summary.n_frames = t->recording->n_frames;
         t->summary.emg = t->recording->emg_report;
         t->summary.alignment = t->recording->alignment;
-        status = mhi_outbox_open(s->out, &t->outbox, err);
-    }
-    if (status == MHE_OK && !s->check_only) {
         status =
             diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis, err);
     }
@@ -233,6 +263,9 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
             status = finish(&t, err);
         }
         interrupt_end();
+    }
+    if (t.outbox != NULL) {
+        tell_stale(&t);
     }
     results_close(t.results);
     mhi_outbox_close(t.outbox);

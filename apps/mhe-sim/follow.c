@@ -143,7 +143,7 @@ mhe_status motion_follow(const motion_setup *setup, mhe_error *err) {
         status = open_postures(&f, err);
     }
     if (status == MHE_OK) {
-        status = simulation_files(&f.simulation, setup->out, err);
+        status = simulation_files(&f.simulation, setup->out, setup->input, err);
     }
     if (status == MHE_OK) {
         status = follow_path(&f, err);

@@ -103,7 +103,7 @@ mhe_status motion_forward(const motion_setup *setup, mhe_error *err) {
         status = open_excitations(&f, err);
     }
     if (status == MHE_OK) {
-        status = simulation_files(&f.simulation, setup->out, err);
+        status = simulation_files(&f.simulation, setup->out, setup->input, err);
     }
     if (status == MHE_OK) {
         status = integrate(&f, err);

@@ -8,7 +8,6 @@
 #include "io/sink.h"
 
 #include <math.h>
-#include <sys/stat.h>
 
 typedef struct recorder {
     const mhi_noise_config *config;
@@ -123,18 +122,17 @@ static mhe_status write_config(recorder *r, mhe_error *err) {
 }
 
 /* noise.yaml in the folder may be the very config, with its owner's words in it. */
-static mhe_status spare_config(const recorder *r, const char *out, mhe_error *err) {
-    mhi_text path = {0};
-    struct stat config, result;
-    mhi_text_add(&path, "%s/noise.yaml", out);
-    const int32_t same = !path.failed && stat(r->config->run->path, &config) == 0 &&
-                         stat(path.data, &result) == 0 && config.st_dev == result.st_dev &&
-                         config.st_ino == result.st_ino;
-    mhi_text_free(&path);
-    return same ? mhe_fail(err, MHE_E_ARGUMENT,
-                           "%s would be overwritten by what was applied; give another --out",
-                           r->config->run->path)
-                : MHE_OK;
+static mhe_status claim_folder(recorder *r, const char *out, mhe_error *err) {
+    static const char *const names[] = {"markers.trc", "emg.sto",  "recording.c3d",
+                                        "noise.yaml",  "noise.gp", "noise.svg"};
+    mhe_status status = mhi_outbox_open(out, &r->outbox, err);
+    if (status == MHE_OK) {
+        status = mhi_outbox_claim(r->outbox, names, (int32_t)(sizeof names / sizeof names[0]), err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_spare(r->outbox, r->config->run->path, err);
+    }
+    return status == MHE_OK ? mhi_outbox_spare(r->outbox, r->config->reference, err) : status;
 }
 
 /* A recording without its picture is complete. */
@@ -149,12 +147,9 @@ static void draw(recorder *r, const char *out) {
 mhe_status noise_record(const mhi_noise_config *config, const mhe_host *host, const char *out,
                         mhe_error *err) {
     recorder r = {.config = config, .host = host};
-    mhe_status status = spare_config(&r, out, err);
+    mhe_status status = claim_folder(&r, out, err);
     if (status == MHE_OK) {
         status = record(&r, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_outbox_open(out, &r.outbox, err);
     }
     if (status == MHE_OK) {
         status = write_markers(&r, err);

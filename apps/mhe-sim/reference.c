@@ -181,7 +181,7 @@ static mhe_status integrate(reference *r, int32_t number, mhe_error *err) {
         simulation_open(s, r->run, mhi_estimator_system(r->estimator), r->setup->host,
                         r->setup->registry, step->intervals / step->duration, err);
     if (status == MHE_OK) {
-        status = simulation_files(s, folder, err);
+        status = simulation_files(s, folder, NULL, err);
     }
     if (status == MHE_OK) {
         status = reference_track(s, &r->done[number], step->drop,

@@ -69,7 +69,7 @@ mhe_status simulation_steps(const simulation *s, const mhi_table *input, int32_t
     return MHE_OK;
 }
 
-mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err) {
+mhe_status simulation_files(simulation *s, const char *folder, const char *input, mhe_error *err) {
     static const char *const prefix[] = {"q", "qdot", "a", "e", "F"};
     const mhe_description *d = mhi_system_description(s->system);
     const int32_t n_columns = 2 * s->n_q + 3 * s->n_m;
@@ -90,7 +90,14 @@ mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err) {
     for (int32_t i = 0; i < d->n_markers; i++) {
         markers[i] = d->markers[i].name;
     }
+    static const char *const names[] = {"reference.sto", "markers.trc", "emg.sto", "forces.sto"};
     mhe_status status = mhi_outbox_open(folder, &s->outbox, err);
+    if (status == MHE_OK) {
+        status = mhi_outbox_claim(s->outbox, names, (int32_t)(sizeof names / sizeof names[0]), err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_outbox_spare(s->outbox, input, err);
+    }
     if (status == MHE_OK) {
         status = mhi_sink_sto(s->outbox, "reference.sto", "reference", labels, n_columns,
                               &s->reference, err);

@@ -36,8 +36,9 @@ mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *
 /* Steps from the first to the last row of a table; MHE_E_INPUT: more than a file should hold. */
 mhe_status simulation_steps(const simulation *s, const mhi_table *input, int32_t *n,
                             mhe_error *err);
-/* Opens reference.sto, markers.trc and emg.sto in the folder. */
-mhe_status simulation_files(simulation *s, const char *folder, mhe_error *err);
+/* Opens reference.sto, markers.trc and emg.sto in the folder, which is the simulation's alone from
+ * here on and does not hold `input` (NULL: none) under such a name. */
+mhe_status simulation_files(simulation *s, const char *folder, const char *input, mhe_error *err);
 /* Writes state, controls, forces and markers at a time. */
 mhe_status simulation_write(simulation *s, double time, mhe_error *err);
 /* Carries the state over 1/rate seconds. */

@@ -9,13 +9,16 @@ hanging=$2
 demo=$3/models/arm19/demo.yaml
 . "$(dirname "$0")/../support/script.sh"
 
+# begun FOLDER: its results have temporary names
+begun() { ls "$1"/.quality.sto.*.tmp > /dev/null 2>&1; }
+
 # interrupted FOLDER [arguments]: SIGTERM once the results are begun -> status, err.txt
 interrupted() {
     folder=$1
     shift
     timeout -s KILL 60 "$run" "$demo" --quiet --out "$folder" --set output.picture=false "$@" > out.txt 2> err.txt &
     pid=$!
-    until [ -e "$folder/.quality.sto.tmp" ] || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
+    until begun "$folder" || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
     sleep 1
     kill -TERM $pid # timeout hands it on
     wait $pid
@@ -40,7 +43,7 @@ rows=$(sed -n 's/^nRows=//p' live/estimates.sto)
 # The same signal twice in one go, as programs that watch over others send it, is one signal.
 "$run" "$demo" --quiet --out twice --realtime --set output.picture=false > out.txt 2> err.txt &
 pid=$!
-until [ -e twice/.quality.sto.tmp ] || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
+until begun twice || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
 sleep 1
 kill -TERM $pid
 kill -TERM $pid

@@ -1,21 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A folder of files that appear all together, complete, or not at all. */
-#include "io/outbox.h"
+/* A folder of files that appear all together, complete, or not at all.
+ *
+ * A temporary name is new and our own (O_EXCL): what others planted under any name is neither
+ * followed nor written to. At commit old and new files exchange their names, so that a failure
+ * half-way can be undone. */
+#define _GNU_SOURCE /* renameat2 */
+#include "io/outbox_private.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-struct mhi_outbox {
-    char *dir;
-    mhi_outbox_file *files;
-};
+#define TRIES 100
 
-/* Makes every folder of a path. */
-static mhe_status make_folders(const char *dir, mhe_error *err) {
+/* Steps of mhi_outbox_file.placed. */
+enum { NOT_PLACED, PLACED, EXCHANGED, REPLACED };
+
+/* Makes every folder of a path. `made`: the last one was not there. */
+static mhe_status make_folders(const char *dir, int *made, mhe_error *err) {
     char *path = strdup(dir);
     if (path == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", dir);
@@ -28,7 +34,8 @@ static mhe_status make_folders(const char *dir, mhe_error *err) {
             *p = '/';
         }
     }
-    failed = failed || (mkdir(path, 0777) != 0 && errno != EEXIST);
+    *made = !failed && mkdir(path, 0777) == 0;
+    failed = failed || (!*made && errno != EEXIST);
     int reason = errno;
     free(path);
     struct stat info;
@@ -43,7 +50,8 @@ static mhe_status make_folders(const char *dir, mhe_error *err) {
 
 mhe_status mhi_outbox_open(const char *dir, mhi_outbox **outbox, mhe_error *err) {
     *outbox = NULL;
-    mhe_status status = make_folders(dir, err);
+    int made = 0;
+    mhe_status status = make_folders(dir, &made, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -52,18 +60,17 @@ mhe_status mhi_outbox_open(const char *dir, mhi_outbox **outbox, mhe_error *err)
         free(opened);
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", dir);
     }
+    opened->lock = -1;
+    opened->made = made;
+    opened->folder = open(dir, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (opened->folder < 0) {
+        int reason = errno;
+        free(opened->dir);
+        free(opened);
+        return mhe_fail(err, MHE_E_IO, "%s: cannot be opened: %s", dir, strerror(reason));
+    }
     *outbox = opened;
     return MHE_OK;
-}
-
-/* dir/prefix name suffix */
-static char *join(const char *dir, const char *prefix, const char *name, const char *suffix) {
-    size_t size = strlen(dir) + strlen(prefix) + strlen(name) + strlen(suffix) + 2;
-    char *path = malloc(size);
-    if (path != NULL) {
-        (void)snprintf(path, size, "%s/%s%s%s", dir, prefix, name, suffix);
-    }
-    return path;
 }
 
 static void free_file(mhi_outbox_file *file) {
@@ -74,36 +81,95 @@ static void free_file(mhi_outbox_file *file) {
         file->release(file);
     }
     free(file->temporary);
-    free(file->final);
+    free(file->name);
+    free(file->path);
     free(file);
+}
+
+static uint32_t any_number(void) {
+    uint32_t number = 0;
+    if (getrandom(&number, sizeof number, GRND_NONBLOCK) != (ssize_t)sizeof number) {
+        struct timespec
+            now; /* O_EXCL keeps names apart; this one is merely less likely to be new */
+        (void)clock_gettime(CLOCK_MONOTONIC, &now);
+        number = (uint32_t)now.tv_nsec ^ (uint32_t)getpid() << 8;
+    }
+    return number;
+}
+
+/* Opens a new file under a temporary name. */
+static mhe_status open_temporary(const mhi_outbox *outbox, mhi_outbox_file *file, mhe_error *err) {
+    const size_t size = strlen(file->name) + sizeof "." MHI_OUTBOX_MARK "00000000" MHI_OUTBOX_END;
+    file->temporary = malloc(size);
+    if (file->temporary == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", file->name);
+    }
+    int opened = -1;
+    uint32_t number = any_number();
+    for (int i = 0; i < TRIES && opened < 0; i++) {
+        (void)snprintf(file->temporary, size, ".%s" MHI_OUTBOX_MARK "%08x" MHI_OUTBOX_END,
+                       file->name, (unsigned)(number + (uint32_t)i));
+        opened = openat(outbox->folder, file->temporary,
+                        O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+        if (opened < 0 && errno != EEXIST) {
+            break;
+        }
+    }
+    const int reason = errno;
+    if (opened < 0) {
+        free(file->temporary);
+        file->temporary = NULL;
+        return mhe_fail(err, MHE_E_IO, "%s: cannot be written: %s", file->path, strerror(reason));
+    }
+    file->stream = fdopen(opened, "wb");
+    if (file->stream == NULL) {
+        (void)close(opened);
+        (void)unlinkat(outbox->folder, file->temporary, 0);
+        return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", file->path);
+    }
+    (void)snprintf(file->open_path, sizeof file->open_path, "/proc/self/fd/%d", opened);
+    return MHE_OK;
+}
+
+static mhe_status check_name(const mhi_outbox *outbox, const char *name, mhe_error *err) {
+    if (*name == '\0' || strchr(name, '/') != NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "'%s' is no plain file name", name);
+    }
+    for (const mhi_outbox_file *other = outbox->files; other != NULL; other = other->next) {
+        if (strcmp(other->name, name) == 0) {
+            return mhe_fail(err, MHE_E_ARGUMENT, "%s is written twice", other->path);
+        }
+    }
+    int32_t known = outbox->names == NULL;
+    for (int32_t i = 0; i < outbox->n_names && !known; i++) {
+        known = strcmp(outbox->names[i], name) == 0;
+    }
+    return known
+               ? MHE_OK
+               : mhe_fail(err, MHE_E_ARGUMENT,
+                          "'%s' is not in the list of files that the folder was claimed for", name);
 }
 
 mhe_status mhi_outbox_add(mhi_outbox *outbox, const char *name, mhi_outbox_file **file,
                           mhe_error *err) {
     *file = NULL;
-    if (*name == '\0' || strchr(name, '/') != NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "'%s' is no plain file name", name);
+    mhe_status status = check_name(outbox, name, err);
+    if (status != MHE_OK) {
+        return status;
     }
     mhi_outbox_file *added = calloc(1, sizeof *added);
-    if (added == NULL || (added->temporary = join(outbox->dir, ".", name, ".tmp")) == NULL ||
-        (added->final = join(outbox->dir, "", name, "")) == NULL) {
+    const size_t size = strlen(outbox->dir) + strlen(name) + 2;
+    if (added == NULL || (added->name = strdup(name)) == NULL ||
+        (added->path = malloc(size)) == NULL) {
+        status = mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
+    } else {
+        (void)snprintf(added->path, size, "%s/%s", outbox->dir, name);
+        status = open_temporary(outbox, added, err);
+    }
+    if (status != MHE_OK) {
         if (added != NULL) {
             free_file(added);
         }
-        return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
-    }
-    for (const mhi_outbox_file *other = outbox->files; other != NULL; other = other->next) {
-        if (strcmp(other->final, added->final) == 0) {
-            free_file(added);
-            return mhe_fail(err, MHE_E_ARGUMENT, "%s is written twice", other->final);
-        }
-    }
-    added->stream = fopen(added->temporary, "wb");
-    if (added->stream == NULL) {
-        int reason = errno;
-        mhe_status status = mhe_fail(err, MHE_E_IO, "%s: cannot be written: %s", added->temporary,
-                                     strerror(reason));
-        free_file(added);
         return status;
     }
     added->next = outbox->files;
@@ -116,7 +182,7 @@ mhe_status mhi_outbox_write_failed(mhi_outbox_file *file, mhe_error *err) {
     if (file->fault == 0) {
         file->fault = errno != 0 ? errno : EIO;
     }
-    return mhe_fail(err, MHE_E_IO, "%s: cannot be written: %s", file->final, strerror(file->fault));
+    return mhe_fail(err, MHE_E_IO, "%s: cannot be written: %s", file->path, strerror(file->fault));
 }
 
 mhe_status mhi_outbox_text(mhi_outbox *outbox, const char *name, const char *text, mhe_error *err) {
@@ -127,6 +193,8 @@ mhe_status mhi_outbox_text(mhi_outbox *outbox, const char *name, const char *tex
     }
     return status;
 }
+
+/* ---- commit ---- */
 
 /* Everything on the disk, the stream closed; only then may the name change. */
 static mhe_status settle(mhi_outbox_file *file, mhe_error *err) {
@@ -142,34 +210,108 @@ static mhe_status settle(mhi_outbox_file *file, mhe_error *err) {
     return status == MHE_OK && closed != 0 ? mhi_outbox_write_failed(file, err) : status;
 }
 
-mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err) {
+mhe_status mhi_outbox_check_target(const mhi_outbox *outbox, const char *name, mhe_error *err) {
+    struct stat target, folder;
+    if (fstatat(outbox->folder, name, &target, AT_SYMLINK_NOFOLLOW) != 0) {
+        return errno == ENOENT ? MHE_OK
+                               : mhe_fail(err, MHE_E_IO, "%s/%s: cannot be replaced: %s",
+                                          outbox->dir, name, strerror(errno));
+    }
+    if (S_ISDIR(target.st_mode)) {
+        return mhe_fail(err, MHE_E_IO, "%s/%s: a folder stands where a result goes", outbox->dir,
+                        name);
+    }
+    const uid_t self = geteuid(); /* where the folder is sticky, as /tmp is */
+    if (fstat(outbox->folder, &folder) == 0 && (folder.st_mode & S_ISVTX) != 0 && self != 0 &&
+        folder.st_uid != self && target.st_uid != self) {
+        return mhe_fail(err, MHE_E_IO, "%s/%s: the file of another user cannot be replaced here",
+                        outbox->dir, name);
+    }
+    return MHE_OK;
+}
+
+/* 0: done. An old file gets the temporary name; where the file system cannot exchange, it is gone.
+ */
+static int place(const mhi_outbox *outbox, mhi_outbox_file *file) {
+    const int at = outbox->folder;
+    if (renameat2(at, file->temporary, at, file->name, RENAME_EXCHANGE) == 0) {
+        file->placed = EXCHANGED;
+        return 0;
+    }
+    const int absent = errno == ENOENT;
+    if (!absent && errno != EINVAL && errno != ENOSYS) {
+        return -1;
+    }
+    if (renameat(at, file->temporary, at, file->name) != 0) {
+        return -1;
+    }
+    file->placed = absent ? PLACED : REPLACED;
+    return 0;
+}
+
+/* As before the commit, as far as can be. */
+static void displace(const mhi_outbox *outbox, mhi_outbox_file *file) {
+    const int at = outbox->folder;
+    if (file->placed == EXCHANGED) {
+        (void)renameat2(at, file->temporary, at, file->name, RENAME_EXCHANGE);
+    } else if (file->placed == PLACED) {
+        (void)renameat(at, file->name, at, file->temporary);
+    }
+    file->placed = NOT_PLACED;
+}
+
+static mhe_status place_all(mhi_outbox *outbox, mhe_error *err) {
     for (mhi_outbox_file *file = outbox->files; file != NULL; file = file->next) {
-        mhe_status status = settle(file, err);
-        if (status != MHE_OK) {
+        if (place(outbox, file) != 0) {
+            mhe_status status =
+                mhe_fail(err, MHE_E_IO, "%s: cannot be replaced: %s", file->path, strerror(errno));
+            for (mhi_outbox_file *back = outbox->files; back != file; back = back->next) {
+                displace(outbox, back);
+            }
             return status;
         }
     }
+    return MHE_OK;
+}
+
+static void drop_files(mhi_outbox *outbox) {
     while (outbox->files != NULL) {
         mhi_outbox_file *file = outbox->files;
-        if (rename(file->temporary, file->final) != 0) {
-            return mhe_fail(err, MHE_E_IO, "%s: cannot be renamed to %s: %s", file->temporary,
-                            file->final, strerror(errno));
-        }
         outbox->files = file->next;
+        if (file->placed == NOT_PLACED || file->placed == EXCHANGED) {
+            (void)unlinkat(outbox->folder, file->temporary, 0);
+        }
         free_file(file);
     }
-    int folder = open(outbox->dir, O_RDONLY | O_DIRECTORY); /* the names too should last */
-    if (folder >= 0) {
-        (void)fsync(folder);
-        (void)close(folder);
+}
+
+mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (mhi_outbox_file *file = outbox->files; file != NULL && status == MHE_OK;
+         file = file->next) {
+        status = settle(file, err);
     }
-    return MHE_OK;
+    for (mhi_outbox_file *file = outbox->files; file != NULL && status == MHE_OK;
+         file = file->next) {
+        status = mhi_outbox_check_target(outbox, file->name, err);
+    }
+    if (status == MHE_OK) {
+        status = place_all(outbox, err);
+    }
+    if (status == MHE_OK) {
+        drop_files(outbox);
+        (void)fsync(outbox->folder); /* the names too should last */
+    }
+    return status;
 }
 
 void mhi_outbox_abandon(const mhi_outbox *outbox) {
     const mhi_outbox_file *file = outbox == NULL ? NULL : outbox->files;
     for (; file != NULL; file = file->next) {
-        (void)unlink(file->temporary);
+        (void)unlinkat(outbox->folder, file->temporary, 0);
+    }
+    if (outbox != NULL && outbox->lock >= 0) {
+        (void)unlinkat(outbox->folder, MHI_OUTBOX_LOCK, 0);
     }
 }
 
@@ -177,11 +319,12 @@ void mhi_outbox_close(mhi_outbox *outbox) {
     if (outbox == NULL) {
         return;
     }
-    while (outbox->files != NULL) {
-        mhi_outbox_file *file = outbox->files;
-        outbox->files = file->next;
-        (void)unlink(file->temporary);
-        free_file(file);
+    const int claimed = outbox->lock >= 0;
+    drop_files(outbox);
+    mhi_outbox_unlock(outbox);
+    (void)close(outbox->folder);
+    if (claimed && outbox->made) {
+        (void)rmdir(outbox->dir); /* of a run that wrote nothing; one with files stays */
     }
     free(outbox->dir);
     free(outbox);

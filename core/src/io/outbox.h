@@ -8,12 +8,16 @@
 /* One file of an outbox, still under its temporary name. */
 typedef struct mhi_outbox_file {
     FILE *stream;
-    char *temporary, *final; /* paths */
+    char *temporary, *name; /* within the folder */
+    char *path;             /* what it will be; for messages */
+    char open_path[32];     /* opens the very same file once more, as long as `stream` is open, for
+                             * libraries that write by name: no one can put a link in its place */
     /* Completes the file before it is closed, and frees what belongs to it; either may be NULL. */
     mhe_status (*complete)(struct mhi_outbox_file *file, mhe_error *err);
     void (*release)(struct mhi_outbox_file *file);
-    void *owner;   /* the sink */
-    int32_t fault; /* errno of the first failed write: from then on the file is lost */
+    void *owner;    /* the sink */
+    int32_t fault;  /* errno of the first failed write: from then on the file is lost */
+    int32_t placed; /* how far commit has come with it */
     struct mhi_outbox_file *next;
 } mhi_outbox_file;
 
