@@ -17,16 +17,16 @@
     { 1, 0, 0, 0, 1, 0, 0, 0, 1 }
 
 static const double zero = 0.0, minus_one = -1.0;
-static const double linear[] = {0, 1, 0, 0};
+static const double linear[] = {0, 1};
 static const double spline[] = {0.01, 0.02, 0.015, -0.008}; /* m over rad */
 #define LINEAR \
-    { &zero, linear, 1 }
+    { &zero, linear, 1, 2 }
 
 static const mhe_motion upper_motion[] = {{MHE_MOTION_ROTATION, 0, {0, 0, 1}, LINEAR}};
 static const mhe_motion slide_motion[] = {{MHE_MOTION_TRANSLATION, 1, {0.6, 0, 0.8}, LINEAR}};
 static const mhe_motion lower_motion[] = {
     {MHE_MOTION_ROTATION, 2, {0.36, 0.48, 0.8}, LINEAR},
-    {MHE_MOTION_TRANSLATION, 2, {0, 1, 0}, {&minus_one, spline, 1}}};
+    {MHE_MOTION_TRANSLATION, 2, {0, 1, 0}, {&minus_one, spline, 1, 4}}};
 
 static const mhe_body bodies[] = {{"upper",
                                    -1,
@@ -66,18 +66,18 @@ static const mhe_coordinate coordinates[] = {
     {"swing", 1, -3.0, 3.0, 0, 0}, {"slide", 0, -0.2, 0.2, 0, 0}, {"bend", 1, -2.0, 2.0, 0, 0}};
 static const mhe_marker markers[N_K] = {{"near", 0, {0.03, -0.1, 0.02}},
                                         {"far", 2, {0.01, -0.25, 0.04}}};
-static const mhe_path_point long_path[] = {
-    {-1, {0.05, 0.15, 0.02}}, {0, {0.04, -0.1, 0.03}}, {2, {0.03, -0.05, 0.02}}};
-static const mhe_path_point short_path[] = {{0, {-0.03, -0.1, 0.0}}, {1, {-0.02, -0.05, 0.01}}};
+static const mhe_path_point long_path[] = {{.body = -1, .location = {0.05, 0.15, 0.02}},
+                                           {.body = 0, .location = {0.04, -0.1, 0.03}},
+                                           {.body = 2, .location = {0.03, -0.05, 0.02}}};
+static const mhe_path_point short_path[] = {{.body = 0, .location = {-0.03, -0.1, 0.0}},
+                                            {.body = 1, .location = {-0.02, -0.05, 0.01}}};
 
-static mhe_muscle made_up(const char *name, const mhe_path_point *points, int32_t n_points) {
-    mhe_muscle m = {.name = name, .n_points = n_points, .points = points};
+static mhe_muscle made_up(const char *name) {
+    mhe_muscle m = mhe_muscle_unstated(name);
     m.max_isometric_force = 500;
     m.optimal_fiber_length = 0.1;
     m.tendon_slack_length = 0.1;
-    m.max_contraction_velocity = m.activation_time = m.deactivation_time = m.fiber_damping = NAN;
-    m.passive_strain = m.passive_shape = m.active_shape = m.velocity_shape = NAN;
-    m.max_lengthening_force = NAN;
+    m.pennation_angle = 0;
     return m;
 }
 
@@ -266,8 +266,9 @@ static void check_evaluations(mhi_kit *kit, void *const *contexts) {
 }
 
 void mhi_check_model(mhi_kit *kit) {
-    const mhe_muscle muscles[N_M] = {made_up("long", long_path, 3),
-                                     made_up("short", short_path, 2)};
+    const mhe_muscle muscles[N_M] = {made_up("long"), made_up("short")};
+    const mhe_path paths[N_M] = {{.name = "long", .n_points = 3, .points = long_path},
+                                 {.name = "short", .n_points = 2, .points = short_path}};
     const mhe_description description = {.size = sizeof description,
                                          .name = "made up",
                                          .source = "testkit",
@@ -279,7 +280,9 @@ void mhi_check_model(mhi_kit *kit) {
                                          .bodies = bodies,
                                          .coordinates = coordinates,
                                          .markers = markers,
-                                         .muscles = muscles};
+                                         .muscles = muscles,
+                                         .n_paths = N_M,
+                                         .paths = paths};
     const mhe_model_ops *ops = kit->plugin->ops;
     void *self = NULL, *contexts[MHI_WORKERS] = {NULL};
     int n = 0;

@@ -7,27 +7,15 @@
 
 #define N_M 4
 
-static const mhe_path_point straight[2] = {{-1, {0, 0, 0}}, {-1, {0.3, 0, 0}}};
-
 static mhe_muscle made_up(const char *name, int32_t type, double force, double fiber, double slack,
                           double pennation) {
-    return (mhe_muscle){.name = name,
-                        .type = type,
-                        .n_points = 2,
-                        .points = straight,
-                        .max_isometric_force = force,
-                        .optimal_fiber_length = fiber,
-                        .tendon_slack_length = slack,
-                        .pennation_angle = pennation,
-                        .max_contraction_velocity = NAN,
-                        .activation_time = NAN,
-                        .deactivation_time = NAN,
-                        .fiber_damping = NAN,
-                        .passive_strain = NAN,
-                        .passive_shape = NAN,
-                        .active_shape = NAN,
-                        .velocity_shape = NAN,
-                        .max_lengthening_force = NAN};
+    mhe_muscle m = mhe_muscle_unstated(name);
+    m.type = type;
+    m.max_isometric_force = force;
+    m.optimal_fiber_length = fiber;
+    m.tendon_slack_length = slack;
+    m.pennation_angle = pennation;
+    return m;
 }
 
 typedef struct muscle_case {

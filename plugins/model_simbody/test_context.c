@@ -139,12 +139,17 @@ static void outputs_do_not_depend_on_each_other(void **state) {
  * direction, and the rest of the path is as without it. */
 static void coincident_points_have_no_direction(void **state) {
     (void)state;
-    const mhe_path_point points[] = {{-1, {0, 0, 0}}, {0, {0, 0, 0}}, {-1, {0.3, 0, 0}}};
-    const mhe_muscle muscle = {.name = "m", .n_points = 3, .points = points};
+    const mhe_path_point points[] = {{.body = -1, .location = {0, 0, 0}},
+                                     {.body = 0, .location = {0, 0, 0}},
+                                     {.body = -1, .location = {0.3, 0, 0}}};
+    const mhe_muscle muscle = {.name = "m"};
+    const mhe_path path = {.name = "m", .n_points = 3, .points = points};
     mhe_description d = *test_pendulum();
     test_instance t;
     d.n_muscles = 1;
     d.muscles = &muscle;
+    d.n_paths = 1;
+    d.paths = &path;
     test_open(&t, &d, SIMBODY_DYNAMICS_RECURSIVE);
     double length, length_q[2], length_qq[4];
     mhe_kinematics out = {

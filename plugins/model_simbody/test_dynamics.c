@@ -59,7 +59,7 @@ static void pendulum_has_its_closed_form(void **state) {
 }
 
 static double path_length(const mhe_description *d, int32_t muscle, const double *q) {
-    const mhe_muscle *m = &d->muscles[muscle];
+    const mhe_path *m = &d->paths[muscle];
     double length = 0, last[3] = {0}, here[3];
     for (int32_t k = 0; k < m->n_points; k++) {
         test_body_point(d, m->points[k].body, q, m->points[k].location, here);

@@ -69,8 +69,11 @@ static const double cubic[] = {0.1, 0.5, -0.3, 0.2};
 static const double spline_origin[] = {-0.4, -0.4, 0.5};
 static const double spline[] = {0.2, 0.7, 0, 0, 0.2, 0.7, 0, 0.5, 1.1945, 1.9150, 0.5 * 2.7, -0.9};
 
-#define FUNCTION(table, at) \
-    { .origin = at, .coef = table, .n_pieces = (int32_t)(sizeof(table) / (4 * sizeof(double))) }
+#define FUNCTION(table, at)                                         \
+    {                                                               \
+        .origin = at, .coef = table, .n_coef = 4,                   \
+        .n_pieces = (int32_t)(sizeof(table) / (4 * sizeof(double))) \
+    }
 #define PIN(c, f, x, y, z)                                               \
     {                                                                    \
         .kind = MHE_MOTION_ROTATION, .coordinate = c, .axis = {x, y, z}, \
@@ -203,13 +206,18 @@ const mhe_description *test_tangle(void) {
     static const mhe_coordinate coordinates[N_Q] = {{.name = "a"}, {.name = "b"}, {.name = "c"},
                                                     {.name = "d"}, {.name = "e"}, {.name = "f"}};
     static const mhe_path_point points[] = {
-        {-1, {0.1, 0.2, 0.3}}, {0, {0.2, 0, 0.1}},    {1, {0, 0.3, 0.1}},    {2, {0.1, 0.1, -0.2}},
-        {3, {0.2, -0.1, 0}},   {5, {0, 0.2, 0.2}},    {4, {-0.2, 0.1, 0.1}}, {-1, {-0.2, 0, 0.4}},
-        {5, {0.1, 0, -0.1}},   {4, {0.1, 0.3, -0.1}}, {0, {0.1, 0.1, 0.1}},  {1, {0.3, 0, 0}}};
-    static const mhe_muscle muscles[] = {{.name = "through all", .n_points = 7, .points = points},
-                                         {.name = "across", .n_points = 3, .points = points + 7},
-                                         {.name = "still", .n_points = 2, .points = points},
-                                         {.name = "back", .n_points = 8, .points = points + 4}};
+        {.body = -1, .location = {0.1, 0.2, 0.3}}, {.body = 0, .location = {0.2, 0, 0.1}},
+        {.body = 1, .location = {0, 0.3, 0.1}},    {.body = 2, .location = {0.1, 0.1, -0.2}},
+        {.body = 3, .location = {0.2, -0.1, 0}},   {.body = 5, .location = {0, 0.2, 0.2}},
+        {.body = 4, .location = {-0.2, 0.1, 0.1}}, {.body = -1, .location = {-0.2, 0, 0.4}},
+        {.body = 5, .location = {0.1, 0, -0.1}},   {.body = 4, .location = {0.1, 0.3, -0.1}},
+        {.body = 0, .location = {0.1, 0.1, 0.1}},  {.body = 1, .location = {0.3, 0, 0}}};
+    static const mhe_muscle muscles[] = {
+        {.name = "through all"}, {.name = "across"}, {.name = "still"}, {.name = "back"}};
+    static const mhe_path paths[] = {{.name = "through all", .n_points = 7, .points = points},
+                                     {.name = "across", .n_points = 3, .points = points + 7},
+                                     {.name = "still", .n_points = 2, .points = points},
+                                     {.name = "back", .n_points = 8, .points = points + 4}};
     static mhe_description d = {.size = sizeof d,
                                 .name = "tangle",
                                 .gravity = {1.3, -9.1, 2.7},
@@ -220,7 +228,9 @@ const mhe_description *test_tangle(void) {
                                 .bodies = tangle_bodies,
                                 .coordinates = coordinates,
                                 .markers = tangle_markers,
-                                .muscles = muscles};
+                                .muscles = muscles,
+                                .n_paths = 4,
+                                .paths = paths};
     if (tangle_bodies[0].name == NULL) {
         uint64_t seed = 7;
         for (int32_t b = 0; b < N_BODIES; b++) {
@@ -244,8 +254,8 @@ static double function_value(const mhe_function *f, double t) {
         piece = t >= f->origin[i] ? i : piece;
     }
     double s = t - f->origin[piece], value = 0;
-    for (int k = 3; k >= 0; k--) {
-        value = value * s + f->coef[4 * piece + k];
+    for (int32_t k = f->n_coef - 1; k >= 0; k--) {
+        value = value * s + f->coef[f->n_coef * piece + k];
     }
     return value;
 }

@@ -10,12 +10,12 @@
     { 1, 0, 0, 0, 1, 0, 0, 0, 1 }
 
 static const double zero[] = {0};
-static const double straight[] = {0, 1, 0, 0};
+static const double straight[] = {0, 1};
 static const double still[] = {0.5, 0, 0, 0};
-static const mhe_motion pin[] = {{MHE_MOTION_ROTATION, 0, {0, 0, 1}, {zero, straight, 1}}};
-static const mhe_motion slides[] = {{MHE_MOTION_TRANSLATION, -1, {0, 1, 0}, {zero, still, 1}},
-                                    {MHE_MOTION_TRANSLATION, 1, {1, 0, 0}, {zero, still, 1}}};
-static const mhe_motion twist[] = {{MHE_MOTION_ROTATION, 1, {1, 0, 0}, {zero, straight, 1}}};
+static const mhe_motion pin[] = {{MHE_MOTION_ROTATION, 0, {0, 0, 1}, {zero, straight, 1, 2}}};
+static const mhe_motion slides[] = {{MHE_MOTION_TRANSLATION, -1, {0, 1, 0}, {zero, still, 1, 4}},
+                                    {MHE_MOTION_TRANSLATION, 1, {1, 0, 0}, {zero, still, 1, 4}}};
+static const mhe_motion twist[] = {{MHE_MOTION_ROTATION, 1, {1, 0, 0}, {zero, straight, 1, 2}}};
 static const mhe_coordinate coordinates[] = {{.name = "first"}, {.name = "second"}};
 
 static void assert_near(double value, double expected, double tolerance) {
@@ -30,6 +30,7 @@ typedef struct chain {
     mhe_marker markers[2];
     mhe_path_point points[4];
     mhe_muscle muscles[1];
+    mhe_path paths[1];
     mhe_description d;
 } chain;
 
@@ -39,19 +40,25 @@ static void make_chain(chain *c) {
                    {"b", 0, 2, slides, UNIT, {0, 0, 1}, UNIT, {0}, 6, {0}, UNIT},
                    {"c", 1, 1, twist, UNIT, {0}, UNIT, {0, 0, 0.25}, 1, {0}, UNIT}},
         .markers = {{"on b", 1, {0, 0, 1}}, {"on ground", -1, {1, 2, 3}}},
-        .points = {{-1, {0}}, {0, {1, 0, 0}}, {1, {1, 0, 0}}, {2, {0}}},
-        .muscles = {{.name = "m", .n_points = 4}},
+        .points = {{.body = -1, .location = {0}},
+                   {.body = 0, .location = {1, 0, 0}},
+                   {.body = 1, .location = {1, 0, 0}},
+                   {.body = 2, .location = {0}}},
+        .muscles = {{.name = "m"}},
+        .paths = {{.name = "m", .n_points = 4}},
         .d = {.name = "chain",
               .n_bodies = 3,
               .n_coordinates = 2,
               .n_markers = 2,
               .n_muscles = 1,
+              .n_paths = 1,
               .coordinates = coordinates}};
     *c = made;
-    c->muscles[0].points = c->points;
+    c->paths[0].points = c->points;
     c->d.bodies = c->bodies;
     c->d.markers = c->markers;
     c->d.muscles = c->muscles;
+    c->d.paths = c->paths;
 }
 
 static void bodies_that_do_not_move_are_one_link(void **state) {
@@ -102,7 +109,7 @@ static void only_segments_between_links_remain(void **state) {
 static void functions_and_their_derivatives(void **state) {
     (void)state;
     const double origin[] = {9, 1, 2}, coef[] = {1, 2, 0, 0, 3, 1, 1, 1, -1, 0, 4, 0};
-    const mhe_function f = {origin, coef, 3};
+    const mhe_function f = {origin, coef, 3, 4};
     double y[4];
     function_evaluate(&f, 0.5, y); /* piece 0 about 9 */
     assert_near(y[0], 1 + 2 * -8.5, 1e-15);
@@ -162,7 +169,7 @@ static void wrong_descriptions_are_refused(void **state) {
     c.markers[0].body = 3;
     assert_refused(&c, "marker 'on b'");
     make_chain(&c);
-    c.muscles[0].n_points = 1;
+    c.paths[0].n_points = 1;
     assert_refused(&c, "muscle 'm'");
     make_chain(&c);
     c.points[2].location[1] = INFINITY;

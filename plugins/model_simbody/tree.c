@@ -29,19 +29,31 @@ void function_evaluate(const mhe_function *function, double t, double *out) {
             above = middle;
         }
     }
-    const double *c = function->coef + 4 * piece;
+    const double *c = function->coef + piece * function->n_coef;
     double s = t - function->origin[piece];
-    out[0] = c[0] + s * (c[1] + s * (c[2] + s * c[3]));
-    out[1] = c[1] + s * (2 * c[2] + s * 3 * c[3]);
-    out[2] = 2 * c[2] + s * 6 * c[3];
-    out[3] = 6 * c[3];
+    double value = 0, slope = 0, half = 0, sixth = 0; /* f, f', f'' / 2, f''' / 6 by Horner */
+    for (int32_t k = function->n_coef - 1; k >= 0; k--) {
+        sixth = sixth * s + half;
+        half = half * s + slope;
+        slope = slope * s + value;
+        value = value * s + c[k];
+    }
+    out[0] = value;
+    out[1] = slope;
+    out[2] = 2 * half;
+    out[3] = 6 * sixth;
 }
 
 static int function_is_constant(const mhe_function *function) {
     for (int32_t i = 0; i < function->n_pieces; i++) {
-        const double *c = function->coef + 4 * i;
-        if (c[1] != 0 || c[2] != 0 || c[3] != 0 || c[0] != function->coef[0]) {
+        const double *c = function->coef + i * function->n_coef;
+        if (c[0] != function->coef[0]) {
             return 0;
+        }
+        for (int32_t k = 1; k < function->n_coef; k++) {
+            if (c[k] != 0) {
+                return 0;
+            }
         }
     }
     return 1;
@@ -191,7 +203,7 @@ static int32_t tree_common_ancestor(const tree *t, int32_t a, int32_t b) {
     return a;
 }
 
-static void tree_add_path(tree *t, int32_t muscle, const mhe_muscle *m, const placement *places,
+static void tree_add_path(tree *t, int32_t muscle, const mhe_path *m, const placement *places,
                           int32_t **chain) {
     for (int32_t k = 0; k < m->n_points; k++) {
         int32_t here = t->n_points++;
@@ -226,7 +238,7 @@ static mhe_status tree_allocate(const mhe_description *d, tree *t) {
         n_joints += (size_t)d->bodies[i].n_motions;
     }
     for (int32_t i = 0; i < d->n_muscles; i++) {
-        n_points += (size_t)d->muscles[i].n_points;
+        n_points += (size_t)d->paths[i].n_points;
     }
     t->joints = calloc(n_joints + 1, sizeof *t->joints);
     t->markers = calloc((size_t)d->n_markers + 1, sizeof *t->markers);
@@ -264,7 +276,7 @@ static void tree_build(const mhe_description *d, tree *t, placement *places) {
     }
     int32_t *chain = t->chains;
     for (int32_t i = 0; i < d->n_muscles; i++) {
-        tree_add_path(t, i, &d->muscles[i], places, &chain);
+        tree_add_path(t, i, &d->paths[i], places, &chain);
     }
 }
 

@@ -35,7 +35,7 @@ static mhe_status check_motion(const mhe_motion *motion, int32_t n_coordinates, 
         return mhe_fail(err, MHE_E_INPUT, "body '%s': a motion's axis is not a unit vector", body);
     }
     const mhe_function *f = &motion->function;
-    if (f->n_pieces < 1 || !all_finite(f->coef, 4 * f->n_pieces) ||
+    if (f->n_pieces < 1 || f->n_coef < 1 || !all_finite(f->coef, f->n_coef * f->n_pieces) ||
         !all_finite(f->origin, f->n_pieces)) {
         return mhe_fail(err, MHE_E_INPUT, "body '%s': a motion's function is not finite", body);
     }
@@ -96,11 +96,16 @@ mhe_status tree_check_description(const mhe_description *d, mhe_error *err) {
                             d->markers[i].name);
         }
     }
+    if (d->n_muscles > d->n_paths) {
+        return mhe_fail(err, MHE_E_INPUT, "%d muscles, but %d paths", (int)d->n_muscles,
+                        (int)d->n_paths);
+    }
     for (int32_t i = 0; i < d->n_muscles; i++) {
-        const mhe_muscle *m = &d->muscles[i];
+        const mhe_path *m = &d->paths[i];
         int valid = m->n_points >= 2;
         for (int32_t k = 0; k < m->n_points; k++) {
-            valid = valid && is_place(d, m->points[k].body, m->points[k].location);
+            valid = valid && m->points[k].kind == MHE_POINT_FIXED &&
+                    is_place(d, m->points[k].body, m->points[k].location);
         }
         if (!valid) {
             return mhe_fail(err, MHE_E_INPUT, "muscle '%s': its path is not valid", m->name);

@@ -11,21 +11,13 @@
 /* What a file says that states only what it must. */
 static inline mhe_muscle test_muscle(int32_t type, double f_max, double l_opt, double l_slack,
                                      double pennation) {
-    return (mhe_muscle){.name = "sample",
-                        .type = type,
-                        .max_isometric_force = f_max,
-                        .optimal_fiber_length = l_opt,
-                        .tendon_slack_length = l_slack,
-                        .pennation_angle = pennation,
-                        .max_contraction_velocity = NAN,
-                        .activation_time = NAN,
-                        .deactivation_time = NAN,
-                        .fiber_damping = NAN,
-                        .passive_strain = NAN,
-                        .passive_shape = NAN,
-                        .active_shape = NAN,
-                        .velocity_shape = NAN,
-                        .max_lengthening_force = NAN};
+    mhe_muscle m = mhe_muscle_unstated("sample");
+    m.type = type;
+    m.max_isometric_force = f_max;
+    m.optimal_fiber_length = l_opt;
+    m.tendon_slack_length = l_slack;
+    m.pennation_angle = pennation;
+    return m;
 }
 
 /* An instance of the plugin; `ops` is NULL where creation failed with `err`. */

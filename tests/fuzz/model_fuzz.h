@@ -30,7 +30,7 @@ static void require_sound(const mhe_description *d) {
         for (int32_t k = 0; k < body->n_motions; k++) {
             const mhe_motion *m = &body->motions[k];
             require(m->coordinate >= -1 && m->coordinate < d->n_coordinates);
-            require(m->function.n_pieces >= 1);
+            require(m->function.n_pieces >= 1 && m->function.n_coef >= 1);
             require(fabs(hypot(hypot(m->axis[0], m->axis[1]), m->axis[2]) - 1) < 1e-9);
         }
     }
@@ -41,9 +41,9 @@ static void require_sound(const mhe_description *d) {
         require_body(d->markers[i].body, d->n_bodies, d->markers[i].location);
     }
     for (int32_t i = 0; i < d->n_muscles; i++) {
-        require(d->muscles[i].n_points >= 2 && d->muscles[i].max_isometric_force > 0);
-        for (int32_t k = 0; k < d->muscles[i].n_points; k++) {
-            const mhe_path_point *point = &d->muscles[i].points[k];
+        require(d->paths[i].n_points >= 2 && d->muscles[i].max_isometric_force > 0);
+        for (int32_t k = 0; k < d->paths[i].n_points; k++) {
+            const mhe_path_point *point = &d->paths[i].points[k];
             require_body(point->body, d->n_bodies, point->location);
         }
     }

@@ -145,7 +145,7 @@ void test_forward(const mhe_description *d, const double *q, double *markers, do
         world(&p, d->markers[i].body, d->markers[i].location, &markers[3 * i]);
     }
     for (int i = 0; lengths != NULL && i < d->n_muscles; i++) {
-        const mhe_muscle *m = &d->muscles[i];
+        const mhe_path *m = &d->paths[i];
         double from[3], to[3];
         lengths[i] = 0;
         world(&p, m->points[0].body, m->points[0].location, from);

@@ -53,10 +53,10 @@ static void reads_a_small_arm(void **state) {
     assert_true(fabs(r[3] - 1) < 1e-15 && fabs(r[1] + half) < 1e-15 && fabs(r[7] + half) < 1e-15);
     const mhe_muscle *m = &d->muscles[0];
     assert_int_equal(m->type, MHE_MUSCLE_HILL_DEGROOTE);
-    assert_int_equal(m->n_points, 4);
+    assert_int_equal(d->paths[0].n_points, 4);
     const int bodies[] = {0, 1, 0, 1};
     for (int i = 0; i < 4; i++) {
-        assert_int_equal(m->points[i].body, bodies[i]);
+        assert_int_equal(d->paths[0].points[i].body, bodies[i]);
     }
     assert_true(m->pennation_angle == 0 && isnan(m->max_contraction_velocity));
     assert_int_equal(d->markers[0].body, 1);

@@ -288,7 +288,7 @@ static void muscles_of_opensim_4_5(void **state) {
                                       "DeGrooteFregly2016Muscle>\n")));
     const mhe_muscle *m = &d->muscles[0];
     assert_int_equal(m->type, MHE_MUSCLE_DEGROOTE2016);
-    assert_int_equal(m->n_points, 2);
+    assert_int_equal(d->paths[0].n_points, 2);
     assert_true(m->activation_time == 0.015 && m->passive_strain == 0.7 &&
                 m->pennation_angle == 0.1 && isnan(m->deactivation_time));
     assert_true(m->optimal_fiber_length == 0.1 && m->tendon_slack_length == 0.2);

@@ -9,6 +9,9 @@
 
 #include <mhe/abi.h>
 
+#include <math.h>
+#include <string.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -207,6 +210,33 @@ typedef struct mhe_muscle {
     /* Curves that stand in the file (Schutte 1993), in normalised units; n_pieces 0: none. */
     mhe_function active_force_length, passive_force_length, tendon_force_length, force_velocity;
 } mhe_muscle;
+
+/* A muscle of which nothing is known but its name. [any] */
+static inline mhe_muscle mhe_muscle_unstated(const char *name) {
+    mhe_muscle m;
+    memset(&m, 0, sizeof m);
+    mhe_millard_curves *c = &m.millard;
+    m.max_isometric_force = m.optimal_fiber_length = m.tendon_slack_length = NAN;
+    m.pennation_angle = m.maximum_pennation_angle = m.max_contraction_velocity = NAN;
+    m.activation_time = m.deactivation_time = m.minimum_activation = NAN;
+    m.min_control = m.max_control = m.fiber_damping = NAN;
+    m.passive_strain = m.passive_shape = m.active_shape = m.velocity_shape = NAN;
+    m.max_lengthening_force = m.tendon_strain = NAN;
+    c->min_norm_active_fiber_length = c->transition_norm_fiber_length = NAN;
+    c->max_norm_active_fiber_length = c->shallow_ascending_slope = c->minimum_value = NAN;
+    c->concentric_slope_at_vmax = c->concentric_slope_near_vmax = c->isometric_slope = NAN;
+    c->eccentric_slope_at_vmax = c->eccentric_slope_near_vmax = NAN;
+    c->max_eccentric_velocity_force_multiplier = NAN;
+    c->concentric_curviness = c->eccentric_curviness = NAN;
+    c->fiber_strain_at_zero_force = c->fiber_strain_at_one_norm_force = NAN;
+    c->fiber_stiffness_at_low_force = c->fiber_stiffness_at_one_norm_force = NAN;
+    c->fiber_curviness = NAN;
+    c->tendon_strain_at_one_norm_force = c->tendon_stiffness_at_one_norm_force = NAN;
+    c->tendon_norm_force_at_toe_end = c->tendon_curviness = NAN;
+    m.name = name;
+    m.ignore_tendon_compliance = m.ignore_activation_dynamics = -1;
+    return m;
+}
 
 /* Forces other than muscles. */
 

@@ -219,9 +219,7 @@ static void add_coordinates(mhi_biomod *m, segment *s, int32_t kind, const char 
             draft->coordinate.upper = acos(-1);
         }
         const double axis[3] = {axes[i] == 'x', axes[i] == 'y', axes[i] == 'z'};
-        const double identity[4] = {0, 1};
-        mhi_build_motion(b, s->draft, kind, at, axis, mhi_function_polynomial(b, identity),
-                         s->opened.line);
+        mhi_build_motion(b, s->draft, kind, at, axis, mhi_function_identity(b), s->opened.line);
     }
 }
 

@@ -131,20 +131,7 @@ mhi_muscle_draft *mhi_build_muscle(mhi_builder *b, const char *name, int32_t lin
     mhi_muscle_draft *draft = mhi_build_push(b, &b->muscles, sizeof *draft);
     if (draft != NULL) {
         draft->line = line;
-        draft->muscle = (mhe_muscle){.name = name,
-                                     .max_isometric_force = NAN,
-                                     .optimal_fiber_length = NAN,
-                                     .tendon_slack_length = NAN,
-                                     .pennation_angle = NAN,
-                                     .max_contraction_velocity = NAN,
-                                     .activation_time = NAN,
-                                     .deactivation_time = NAN,
-                                     .fiber_damping = NAN,
-                                     .passive_strain = NAN,
-                                     .passive_shape = NAN,
-                                     .active_shape = NAN,
-                                     .velocity_shape = NAN,
-                                     .max_lengthening_force = NAN};
+        draft->muscle = mhe_muscle_unstated(name);
     }
     return draft;
 }

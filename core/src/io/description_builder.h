@@ -50,8 +50,8 @@ typedef struct mhi_marker_draft {
 } mhi_marker_draft;
 
 typedef struct mhi_muscle_draft {
-    mhe_muscle muscle; /* points are filled in by the builder */
-    mhi_list points;   /* mhi_point_draft, in path order */
+    mhe_muscle muscle;
+    mhi_list points; /* mhi_point_draft, in path order */
     int32_t line;
 } mhi_muscle_draft;
 
@@ -118,7 +118,10 @@ void mhi_rotation_sequence(const char *sequence, const double angles[3], double 
 
 /* Functions; memory from the builder. Splines and broken lines need n >= 2 points with increasing
  * x: the reader checks. */
-mhe_function mhi_function_polynomial(mhi_builder *b, const double coef[4]); /* c0 + c1 t + ... */
+mhe_function mhi_function_polynomial(mhi_builder *b, const double *coef,
+                                     int32_t n); /* c0 + c1 t + ... */
+mhe_function mhi_function_constant(mhi_builder *b, double value);
+mhe_function mhi_function_identity(mhi_builder *b);
 mhe_function mhi_function_broken_line(mhi_builder *b, const double *x, const double *y, int32_t n);
 /* The cubic spline of SIMM and OpenSim (SimmSpline): third derivatives at the ends are those of the
  * cubics through the four outermost points (Forsythe, Malcolm & Moler, Computer Methods for

@@ -255,8 +255,8 @@ static void place_motions(mhi_builder *b, const mhi_body_draft *draft, const int
         motions[k].coordinate = number[coordinate];
         if (number[coordinate] < 0) {
             double value = COORDINATE(b, coordinate)->coordinate.value;
-            const double constant[4] = {mhi_function_value(&motions[k].function, value)};
-            motions[k].function = mhi_function_polynomial(b, constant);
+            motions[k].function =
+                mhi_function_constant(b, mhi_function_value(&motions[k].function, value));
         }
     }
     body->motions = motions;
@@ -291,7 +291,7 @@ static mhe_path_point place_point(mhi_builder *b, const int32_t *place, const in
                                   const mhi_point_draft *point, const char *what,
                                   const char *whose) {
     int32_t i = find_body(b, point->body, point->line, what, whose);
-    mhe_path_point out = {.body = i < 0 ? GROUND : place[i]};
+    mhe_path_point out = {.body = i < 0 ? GROUND : place[i], .coordinate = {-1, -1, -1}};
     memcpy(out.location, point->location, sizeof out.location);
     if (out.body >= 0 && mirrored[out.body]) {
         out.location[2] = -out.location[2];
@@ -303,6 +303,7 @@ static void place_points(mhi_builder *b, mhe_description *d, const int32_t *plac
                          const int32_t *mirrored) {
     mhe_marker *markers = MHI_TAKE(&b->arena, mhe_marker, b->markers.n);
     mhe_muscle *muscles = MHI_TAKE(&b->arena, mhe_muscle, b->muscles.n);
+    mhe_path *paths = MHI_TAKE(&b->arena, mhe_path, b->muscles.n);
     for (int32_t i = 0; markers != NULL && i < b->markers.n; i++) {
         const mhi_marker_draft *draft = MARKER(b, i);
         markers[i].name = draft->name;
@@ -311,7 +312,7 @@ static void place_points(mhi_builder *b, mhe_description *d, const int32_t *plac
         markers[i].body = point.body;
         memcpy(markers[i].location, point.location, sizeof markers[i].location);
     }
-    for (int32_t i = 0; muscles != NULL && i < b->muscles.n; i++) {
+    for (int32_t i = 0; muscles != NULL && paths != NULL && i < b->muscles.n; i++) {
         const mhi_muscle_draft *draft = MUSCLE(b, i);
         mhe_path_point *points = MHI_TAKE(&b->arena, mhe_path_point, draft->points.n);
         for (int32_t k = 0; points != NULL && k < draft->points.n; k++) {
@@ -319,19 +320,24 @@ static void place_points(mhi_builder *b, mhe_description *d, const int32_t *plac
                                     draft->muscle.name);
         }
         muscles[i] = draft->muscle;
-        muscles[i].points = points;
-        muscles[i].n_points = points != NULL ? draft->points.n : 0;
+        muscles[i].line = draft->line;
+        paths[i] = (mhe_path){.name = draft->muscle.name,
+                              .n_points = points != NULL ? draft->points.n : 0,
+                              .points = points,
+                              .line = draft->line};
         if (points == NULL && b->status == MHE_OK) {
             b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
         }
     }
-    if ((markers == NULL || muscles == NULL) && b->status == MHE_OK) {
+    if ((markers == NULL || muscles == NULL || paths == NULL) && b->status == MHE_OK) {
         b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
     }
     d->markers = markers;
     d->n_markers = b->markers.n;
     d->muscles = muscles;
     d->n_muscles = b->muscles.n;
+    d->paths = paths;
+    d->n_paths = b->muscles.n;
 }
 
 /* "models/arm.osim" -> "arm" */

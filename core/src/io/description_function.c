@@ -1,15 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* description_function.c: scalar functions as rows of cubic pieces, and rigid transforms. */
+/* description_function.c: scalar functions as rows of polynomial pieces, and rigid transforms. */
 #include "io/description_builder.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Room for n pieces; n_pieces 0 when memory is out (the builder then has failed). */
-static mhe_function pieces(mhi_builder *b, int32_t n, double **origin, double **coef) {
+/* Room for n pieces of n_coef coefficients; n_pieces 0 when memory is out (the builder then has
+ * failed). */
+static mhe_function pieces(mhi_builder *b, int32_t n, int32_t n_coef, double **origin,
+                           double **coef) {
     mhe_function f = {0};
     *origin = MHI_TAKE(&b->arena, double, n);
-    *coef = MHI_TAKE(&b->arena, double, 4 * n);
+    *coef = MHI_TAKE(&b->arena, double, n *n_coef);
     if (*origin == NULL || *coef == NULL) {
         b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
         return f;
@@ -17,26 +19,35 @@ static mhe_function pieces(mhi_builder *b, int32_t n, double **origin, double **
     f.origin = *origin;
     f.coef = *coef;
     f.n_pieces = n;
+    f.n_coef = n_coef;
     return f;
 }
 
-mhe_function mhi_function_polynomial(mhi_builder *b, const double coef[4]) {
+mhe_function mhi_function_polynomial(mhi_builder *b, const double *coef, int32_t n) {
     double *origin, *c;
-    mhe_function f = pieces(b, 1, &origin, &c);
+    mhe_function f = pieces(b, 1, n, &origin, &c);
     if (f.n_pieces > 0) {
-        memcpy(c, coef, 4 * sizeof *coef);
+        memcpy(c, coef, sizeof *coef * (size_t)n);
     }
     return f;
 }
 
+mhe_function mhi_function_constant(mhi_builder *b, double value) {
+    return mhi_function_polynomial(b, &value, 1);
+}
+
+mhe_function mhi_function_identity(mhi_builder *b) {
+    return mhi_function_polynomial(b, (const double[2]){0, 1}, 2);
+}
+
 mhe_function mhi_function_scaled(mhi_builder *b, double scale, mhe_function function) {
     double *origin, *coef;
-    mhe_function f = pieces(b, function.n_pieces, &origin, &coef);
+    mhe_function f = pieces(b, function.n_pieces, function.n_coef, &origin, &coef);
     for (int32_t i = 0; i < f.n_pieces; i++) {
         origin[i] = function.origin[i];
-        for (int32_t k = 0; k < 4; k++) {
-            coef[4 * i + k] = scale * function.coef[4 * i + k];
-        }
+    }
+    for (int32_t i = 0; i < f.n_pieces * f.n_coef; i++) {
+        coef[i] = scale * function.coef[i];
     }
     return f;
 }
@@ -46,9 +57,12 @@ double mhi_function_value(const mhe_function *function, double t) {
     while (i + 1 < function->n_pieces && t >= function->origin[i + 1]) {
         i++;
     }
-    const double *c = &function->coef[(size_t)i * 4];
-    double s = t - function->origin[i];
-    return c[0] + s * (c[1] + s * (c[2] + s * c[3]));
+    const double *c = &function->coef[i * function->n_coef];
+    double s = t - function->origin[i], value = 0;
+    for (int32_t k = function->n_coef - 1; k >= 0; k--) {
+        value = value * s + c[k];
+    }
+    return value;
 }
 
 /* Slope of segment i. */
@@ -58,11 +72,11 @@ static double chord(const double *x, const double *y, int32_t i) {
 
 mhe_function mhi_function_broken_line(mhi_builder *b, const double *x, const double *y, int32_t n) {
     double *origin, *coef;
-    mhe_function f = pieces(b, n - 1, &origin, &coef);
+    mhe_function f = pieces(b, n - 1, 2, &origin, &coef);
     for (int32_t i = 0; i < f.n_pieces; i++) {
         origin[i] = x[i];
-        coef[4 * i] = y[i];
-        coef[4 * i + 1] = chord(x, y, i);
+        coef[2 * i] = y[i];
+        coef[2 * i + 1] = chord(x, y, i);
     }
     return f;
 }
@@ -106,7 +120,7 @@ mhe_function mhi_function_spline(mhi_builder *b, const double *x, const double *
     }
     double *origin, *coef;
     double *diagonal = MHI_TAKE(&b->arena, double, n), *sigma = MHI_TAKE(&b->arena, double, n);
-    mhe_function f = pieces(b, n + 1, &origin, &coef);
+    mhe_function f = pieces(b, n + 1, 4, &origin, &coef);
     if (diagonal == NULL || sigma == NULL || f.n_pieces == 0) {
         b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
         return (mhe_function){0};

@@ -7,12 +7,12 @@
 
 /* f(at) as a function of its own; n_pieces 0 when memory is out. */
 static mhe_function constant(mhi_arena *arena, const mhe_function *f, double at) {
-    double *origin = MHI_TAKE(arena, double, 1), *coef = MHI_TAKE(arena, double, 4);
+    double *origin = MHI_TAKE(arena, double, 1), *coef = MHI_TAKE(arena, double, 1);
     if (origin == NULL || coef == NULL) {
         return (mhe_function){0};
     }
     coef[0] = mhi_function_value(f, at);
-    return (mhe_function){.origin = origin, .coef = coef, .n_pieces = 1};
+    return (mhe_function){.origin = origin, .coef = coef, .n_pieces = 1, .n_coef = 1};
 }
 
 /* The motions of a body with coordinates numbered anew, -1: locked; NULL when memory is out. */

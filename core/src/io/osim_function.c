@@ -23,7 +23,7 @@ static int32_t read_linear(mhi_osim *o, xmlNode *node, const char *whose, mhe_fu
     double c[2] = {1, 0};
     (void)whose;
     (void)mhi_xml_numbers(o, node, "coefficients", c, 2);
-    *function = mhi_function_polynomial(&o->b, (const double[4]){c[1], c[0]});
+    *function = mhi_function_polynomial(&o->b, (const double[2]){c[1], c[0]}, 2);
     return 1;
 }
 
@@ -32,7 +32,7 @@ static int32_t read_constant(mhi_osim *o, xmlNode *node, const char *whose,
     double value = 0;
     (void)whose;
     (void)mhi_xml_numbers(o, node, "value", &value, 1);
-    *function = mhi_function_polynomial(&o->b, (const double[4]){value});
+    *function = mhi_function_constant(&o->b, value);
     return 1;
 }
 
@@ -40,20 +40,18 @@ static int32_t read_constant(mhi_osim *o, xmlNode *node, const char *whose,
 static int32_t read_polynomial(mhi_osim *o, xmlNode *node, const char *whose,
                                mhe_function *function) {
     int32_t n;
-    const double *c = mhi_xml_all_numbers(o, mhi_xml_property(node, "coefficients"), &n);
-    double coef[4] = {0};
-    if (c == NULL) {
+    double *c = mhi_xml_all_numbers(o, mhi_xml_property(node, "coefficients"), &n);
+    if (c == NULL || n < 1) {
+        mhi_build_fail(&o->b, mhi_xml_line(node), "<PolynomialFunction> of %s has no coefficients",
+                       whose);
         return -1;
     }
-    if (n > 4) {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node), "PolynomialFunction of degree %d of %s",
-                              (int)n - 1, whose);
-        return -1;
+    for (int32_t i = 0; i < n / 2; i++) {
+        double swap = c[i];
+        c[i] = c[n - 1 - i];
+        c[n - 1 - i] = swap;
     }
-    for (int32_t i = 0; i < n; i++) {
-        coef[i] = c[n - 1 - i];
-    }
-    *function = mhi_function_polynomial(&o->b, coef);
+    *function = mhi_function_polynomial(&o->b, c, n);
     return 1;
 }
 

@@ -87,9 +87,8 @@ static void build_plain(mhi_osim *o, joint *j, const char *motions) {
         mhi_coordinate_draft *draft = o->b.coordinates.items[at];
         draft->coordinate.rotational = m[0] == 'R';
         const double axis[3] = {m[1] == 'x', m[1] == 'y', m[1] == 'z'};
-        const double identity[4] = {0, 1};
         mhi_build_motion(&o->b, j->body, m[0] == 'R' ? MHE_MOTION_ROTATION : MHE_MOTION_TRANSLATION,
-                         at, axis, mhi_function_polynomial(&o->b, identity), line);
+                         at, axis, mhi_function_identity(&o->b), line);
     }
 }
 
@@ -122,7 +121,7 @@ static void build_axis(mhi_osim *o, joint *j, xmlNode *node, int32_t kind) {
         coordinate = joint_coordinate(o, j, coordinates, line);
     }
     if (found == 0 && coordinate >= 0) {
-        function = mhi_function_polynomial(&o->b, (const double[4]){0, 1});
+        function = mhi_function_identity(&o->b);
     } else if (found != 1) {
         return;
     }
