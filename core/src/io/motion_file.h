@@ -5,10 +5,10 @@
 
 #include "io/table.h"
 
-/* Markers: the points of a .c3d, anything else as .trc. MHE_E_INPUT as the format's reader, and for
- * a .c3d without points. [cold] */
+/* Markers: the points of a .c3d, the markers of an .xdf, anything else as .trc. MHE_E_INPUT as the
+ * format's reader, and for a container without any. [cold] */
 mhe_status mhi_markers_read(const char *path, mhi_table **table, mhe_error *err);
-/* Signals: the analog channels of a .c3d, anything else as .sto. [cold] */
+/* Signals: the analog channels of a .c3d, the EMG of an .xdf, anything else as .sto. [cold] */
 mhe_status mhi_signals_read(const char *path, mhi_table **table, mhe_error *err);
 
 #endif
