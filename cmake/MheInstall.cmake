@@ -10,8 +10,9 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/core/include/mhe DESTINATION ${CMAKE_INS
 install(FILES ${PROJECT_BINARY_DIR}/core/include/mhe/version.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mhe)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
-# Two sets: a plugin needs headers and the conformance program alone, and none of the libraries behind the core.
-install(TARGETS mhe_plugin EXPORT mhePluginTargets)
+# Two sets: plugins and applications need the headers, libmhe.so and the conformance program, and none of the libraries
+# behind the core; who links the test kit statically needs those too.
+install(TARGETS mhe_plugin mhe_library EXPORT mhePluginTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(TARGETS mhe_core EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 if(TARGET mhe_testkit)
     install(TARGETS mhe_testkit EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})

@@ -61,7 +61,7 @@ application_by_pkg_config() {
     # shellcheck disable=SC2046
     "$cc" -std=c11 ${sanitizers:+-fsanitize=$sanitizers} "$here/external_app/embed.c" $(pkg-config --cflags --libs mhe) \
         -o "$work/embed_by_pkg_config"
-    "$work/embed_by_pkg_config" "$source/models/arm19/demo.yaml" >"$work/embed.txt"
+    LD_LIBRARY_PATH="$prefix/$libdir" "$work/embed_by_pkg_config" "$source/models/arm19/demo.yaml" >"$work/embed.txt"
     expect "4 coordinates, 19 muscles" "$work/embed.txt"
 }
 
@@ -95,10 +95,15 @@ run_with_plugin() {
 install_and_move
 build_project external_cost
 (cd "$work/external_cost" && ctest --output-on-failure) >"$work/ctest.log" || { cat "$work/ctest.log"; give_up ctest; }
-export MHE_PLUGIN_PATH="$work/external_cost"
 build_project external_app
-"$work/external_app/embed" "$source/models/arm19/demo.yaml" >"$work/embed.txt" || give_up embed
+# It lies outside of bin/ and knows of no variable: the plugins are found as seen from libmhe.so.
+env -u MHE_PLUGIN_PATH "$work/external_app/embed" "$source/models/arm19/demo.yaml" >"$work/embed.txt" || give_up embed
 expect "4 coordinates, 19 muscles" "$work/embed.txt"
+export MHE_PLUGIN_PATH="$work/external_cost"
+"$work/external_app/embed" "$source/models/arm19/demo.yaml" --set=solver.plugin=no.such.plugin >"$work/none.txt" 2>&1 &&
+    give_up "a plugin that is not there was found"
+expect "no plugin 'no.such.plugin'" "$work/none.txt"
+expect "searched: $work/external_cost, $prefix/$libdir/mhe/plugins/abi0, " "$work/none.txt"
 export PKG_CONFIG_PATH="$prefix/$libdir/pkgconfig"
 plugin_by_pkg_config
 application_by_pkg_config

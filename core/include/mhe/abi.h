@@ -21,6 +21,7 @@ extern "C" {
 #define MHE_ABI_MAJOR 0
 #define MHE_ABI_MINOR 1
 
+/* MHE_EXPORT: the entry of a plugin. MHE_API: a function of libmhe.so. */
 #if defined(__GNUC__)
 #define MHE_EXPORT __attribute__((visibility("default")))
 #define MHE_PRINTF(at, first) __attribute__((format(printf, at, first)))
@@ -28,6 +29,7 @@ extern "C" {
 #define MHE_EXPORT
 #define MHE_PRINTF(at, first)
 #endif
+#define MHE_API MHE_EXPORT
 
 /* 0: done. Positive: this point is no good, another may be (solvers and integrators shorten the
  * step). Negative: give up. */

@@ -26,22 +26,22 @@ typedef struct mhe_emg mhe_emg;
 /* For samples of `columns` [n_columns], among which the config's channels must be, at `rate` (Hz).
  * `set` [n_set] and `host` as for mhe_estimator_open. MHE_E_CONFIG, MHE_E_INPUT, MHE_E_PLUGIN:
  * err->text says what; also where the config has no emg.channels, or asks for zero_phase. [cold] */
-mhe_status mhe_emg_open(const char *config, const char *const *set, int32_t n_set,
-                        const char *const *columns, int32_t n_columns, double rate,
-                        const mhe_host *host, mhe_emg **emg, mhe_error *err);
-void mhe_emg_close(mhe_emg *emg); /* NULL is fine. [cold] */
+MHE_API mhe_status mhe_emg_open(const char *config, const char *const *set, int32_t n_set,
+                                const char *const *columns, int32_t n_columns, double rate,
+                                const mhe_host *host, mhe_emg **emg, mhe_error *err);
+MHE_API void mhe_emg_close(mhe_emg *emg); /* NULL is fine. [cold] */
 
 /* The next sample: raw [n_columns], in the columns' units, NaN where missing; time in s. A time
  * that does not increase is passed over; a step over samples is a gap. Allocates nothing. [cold] */
-void mhe_emg_push(mhe_emg *emg, double time, const double *raw);
+MHE_API void mhe_emg_push(mhe_emg *emg, double time, const double *raw);
 
 /* Normalised EMG [n_muscles of the model] of a frame: the newest there is at or before its time.
  * NaN: a muscle without an electrode, a gap, filters that still fill. Allocates nothing. [cold] */
-void mhe_emg_at(const mhe_emg *emg, double time, double *values);
+MHE_API void mhe_emg_at(const mhe_emg *emg, double time, double *values);
 
 /* s by which the values come late: the filters' group delay less the electromechanical delay. [any]
  */
-double mhe_emg_lag(const mhe_emg *emg);
+MHE_API double mhe_emg_lag(const mhe_emg *emg);
 
 #ifdef __cplusplus
 }

@@ -98,16 +98,17 @@ typedef struct mhe_estimate {
 /* Opens a config file with `set` [n_set] assignments "path.to.key=value". `host` may be NULL
  * (messages are dropped). MHE_E_CONFIG, MHE_E_INPUT, MHE_E_PLUGIN: err->text says file:line and
  * what. [cold] */
-mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
-                              const mhe_host *host, mhe_estimator **estimator, mhe_error *err);
-void mhe_estimator_close(mhe_estimator *estimator); /* NULL is fine. [cold] */
+MHE_API mhe_status mhe_estimator_open(const char *config, const char *const *set, int32_t n_set,
+                                      const mhe_host *host, mhe_estimator **estimator,
+                                      mhe_error *err);
+MHE_API void mhe_estimator_close(mhe_estimator *estimator); /* NULL is fine. [cold] */
 
 /* Fills `info`. [cold] */
-void mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
+MHE_API void mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
 
 /* Does what can be done before the next frame comes: shifts the window, linearises it where the
  * solver can. May be called after each push; push does itself what was not done. [cold] */
-mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *err);
+MHE_API mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *err);
 
 /* Takes the next frame (time must increase). `*ready` is 1 when `estimate` was filled: from the
  * window's first fill on, at every ratio-th frame; where frames have markers or angles, not before
@@ -116,8 +117,8 @@ mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *err);
  * the frame is out of order); the frame is not taken. MHE_E_INPUT: no marker of the first window is
  * within a metre of the model, or the frames are half a second or more apart (times in ms?); the
  * window moves on and the next frame is tried. Anything else is a bug. [cold] */
-mhe_status mhe_estimator_push(mhe_estimator *estimator, const mhe_frame *frame,
-                              mhe_estimate *estimate, int32_t *ready, mhe_error *err);
+MHE_API mhe_status mhe_estimator_push(mhe_estimator *estimator, const mhe_frame *frame,
+                                      mhe_estimate *estimate, int32_t *ready, mhe_error *err);
 
 #ifdef __cplusplus
 }

@@ -4,6 +4,7 @@
 
 #include "base/arena.h"
 #include "plugin/loader.h"
+#include "plugin/place.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -11,7 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 /* One shared object, or a folder that could not be searched. */
 typedef struct library {
@@ -39,10 +39,12 @@ typedef struct entry {
 struct mhi_registry {
     const mhe_host *host;
     mhi_arena arena;
-    folder *own;      /* of the caller, searched first ... */
-    folder *standard; /* ... then these */
-    int32_t current;  /* the two lists below are up to date */
-    entry *entries;   /* sorted by id */
+    folder *own;                    /* of the caller, searched first ... */
+    folder *standard;               /* ... then these */
+    const char *absent[MHI_PLACES]; /* folders of an installation that are not there */
+    int32_t n_absent;
+    int32_t current; /* the two lists below are up to date */
+    entry *entries;  /* sorted by id */
     const char **refused;
     int32_t n_entries, n_refused;
 };
@@ -110,13 +112,17 @@ mhe_status mhi_registry_add_folder(mhi_registry *r, const char *path, mhe_error 
                                                  : append_folder(r, &r->own, resolved, err);
 }
 
-/* A folder of the installation or the build tree: absent is fine, a second mention too. */
+/* A folder of the installation or the build tree: absent is fine, though it is told where a plugin
+ * is missing; a second mention is fine too. */
 static mhe_status add_standard(mhi_registry *r, const char *path, mhe_error *err) {
     char resolved[PATH_MAX];
-    if (realpath(path, resolved) == NULL || find_folder(r->standard, resolved) != NULL) {
+    if (realpath(path, resolved) == NULL) {
+        r->absent[r->n_absent++] = path;
         return MHE_OK;
     }
-    return append_folder(r, &r->standard, resolved, err);
+    return find_folder(r->standard, resolved) != NULL
+               ? MHE_OK
+               : append_folder(r, &r->standard, resolved, err);
 }
 
 /* MHE_PLUGIN_PATH. An empty entry would be the working directory: passed over. */
@@ -142,27 +148,13 @@ static mhe_status add_from_environment(mhi_registry *r, mhe_error *err) {
     return MHE_OK;
 }
 
-/* The installed folder, first as seen from the running program, so that a moved installation still
- * finds its plugins; the build tree for programs of the build tree alone: what is installed does
- * not depend on who may write where it was built. */
-static mhe_status add_installed_and_built(mhi_registry *r, mhe_error *err) {
-    char program[PATH_MAX] = "", built[PATH_MAX];
-    ssize_t n = readlink("/proc/self/exe", program, sizeof program - 1);
-    program[n < 0 ? 0 : n] = '\0';
-    const int is_built = realpath(MHE_BUILD_DIR, built) != NULL &&
-                         strncmp(program, built, strlen(built)) == 0 &&
-                         program[strlen(built)] == '/';
-    char *slash = strrchr(program, '/');
-    mhe_status status = MHE_OK;
-    if (slash != NULL) {
-        *slash = '\0';
-        char *path = mhi_arena_format(&r->arena, "%s/%s", program, MHE_PLUGIN_DIR_FROM_BIN);
-        status = path == NULL ? no_memory(err) : add_standard(r, path, err);
+static mhe_status add_installed(mhi_registry *r, mhe_error *err) {
+    mhi_places places;
+    mhe_status status = mhi_places_of_plugins(&r->arena, &places, err);
+    for (int32_t i = 0; i < places.n && status == MHE_OK; i++) {
+        status = add_standard(r, places.path[i], err);
     }
-    if (status == MHE_OK) {
-        status = add_standard(r, MHE_INSTALLED_PLUGIN_DIR, err);
-    }
-    return status == MHE_OK && is_built ? add_standard(r, MHE_BUILD_PLUGIN_DIR, err) : status;
+    return status;
 }
 
 mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mhe_error *err) {
@@ -173,7 +165,7 @@ mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mh
     r->host = host;
     mhe_status status = add_from_environment(r, err);
     if (status == MHE_OK) {
-        status = add_installed_and_built(r, err);
+        status = add_installed(r, err);
     }
     if (status != MHE_OK) {
         mhi_registry_free(r);
@@ -332,13 +324,17 @@ static mhe_status not_found(mhi_registry *r, const char *id, const char *iface, 
     mhi_text text = {0};
     mhi_text_add(&text, "no plugin '%s'%s", id,
                  mhi_suggest(near, sizeof near, id, ids, r->n_entries));
-    for (int32_t i = 0; i < r->n_refused; i++) {
-        mhi_text_add(&text, "%s%s", i == 0 ? "; refused: " : ", ", r->refused[i]);
-    }
     const char *lead = "; searched: ";
     for (const folder *f = after(r, NULL); f != NULL; f = after(r, f)) {
         mhi_text_add(&text, "%s%s", lead, f->path);
         lead = ", ";
+    }
+    for (int32_t i = 0; i < r->n_absent; i++) {
+        mhi_text_add(&text, "%s%s (absent)", lead, r->absent[i]);
+        lead = ", ";
+    }
+    for (int32_t i = 0; i < r->n_refused; i++) {
+        mhi_text_add(&text, "%s%s", i == 0 ? "; refused: " : ", ", r->refused[i]);
     }
     mhe_status status = text.failed ? no_memory(err) : mhe_fail(err, MHE_E_PLUGIN, "%s", text.data);
     mhi_text_free(&text);

@@ -13,8 +13,9 @@ typedef struct mhi_registry mhi_registry;
 const mhe_host *mhi_host_or_silent(const mhe_host *host);
 
 /* An empty registry that already knows its standard folders: MHE_PLUGIN_PATH (':' between folders),
- * the installed <libdir>/mhe/plugins/abi0, for programs of the build tree its plugin folder. They
- * are scanned at the first look-up. `host` is lent for life. [cold] */
+ * the installed <libdir>/mhe/plugins/abi0 as seen from libmhe.so (place.h), for what lies in the
+ * build tree its plugin folder. They are scanned at the first look-up. `host` is lent for life.
+ * [cold] */
 mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mhe_error *err);
 void mhi_registry_free(mhi_registry *registry); /* libraries stay loaded until exit */
 
@@ -23,7 +24,7 @@ void mhi_registry_free(mhi_registry *registry); /* libraries stay loaded until e
 mhe_status mhi_registry_add_folder(mhi_registry *registry, const char *folder, mhe_error *err);
 
 /* The plugin with this id whose interface is `iface` (NULL: any). MHE_E_PLUGIN: none; the message
- * gives the nearest id and says which files were refused and why. */
+ * gives the nearest id, each folder searched, and which files were refused and why. */
 mhe_status mhi_registry_find(mhi_registry *registry, const char *id, const char *iface,
                              const mhe_plugin **plugin, mhe_error *err);
 

@@ -3,15 +3,18 @@
  * the config that it is given and prints its sizes. */
 #include <mhe/estimator.h>
 #include <mhe/version.h>
+#include <string.h>
 
 int main(int argc, char **argv) {
     mhe_estimator *estimator = NULL;
     mhe_error err = {0};
-    if (argc != 2) {
-        fprintf(stderr, "usage: embed CONFIG.yaml\n");
+    const int has_set = argc == 3 && strncmp(argv[2], "--set=", 6) == 0;
+    if (argc != 2 && !has_set) {
+        fprintf(stderr, "usage: embed CONFIG.yaml [--set=KEY=VALUE]\n");
         return 2;
     }
-    if (mhe_estimator_open(argv[1], NULL, 0, NULL, &estimator, &err) != MHE_OK) {
+    const char *set[] = {has_set ? argv[2] + 6 : ""};
+    if (mhe_estimator_open(argv[1], set, has_set, NULL, &estimator, &err) != MHE_OK) {
         fprintf(stderr, "%s\n", err.text);
         return 1;
     }
