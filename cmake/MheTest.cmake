@@ -7,6 +7,14 @@ find_package(cmocka QUIET)
 if(NOT cmocka_FOUND)
     pkg_check_modules(CMOCKA REQUIRED IMPORTED_TARGET cmocka)
 endif()
+add_library(mhe_cmocka INTERFACE)
+if(TARGET cmocka::cmocka)
+    target_link_libraries(mhe_cmocka INTERFACE cmocka::cmocka)
+elseif(TARGET PkgConfig::CMOCKA)
+    target_link_libraries(mhe_cmocka INTERFACE PkgConfig::CMOCKA)
+else()
+    target_link_libraries(mhe_cmocka INTERFACE ${CMOCKA_LIBRARIES})
+endif()
 
 function(mhe_test_environment test)
     set_tests_properties(${test} PROPERTIES SKIP_RETURN_CODE 77 TIMEOUT 600 ENVIRONMENT
@@ -26,6 +34,23 @@ function(mhe_test name)
     set_target_properties(test_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
     add_test(NAME ${name} COMMAND test_${name})
     set_tests_properties(${name} PROPERTIES LABELS ${arg_LABEL})
+    mhe_test_environment(${name})
+endfunction()
+
+# mhe_public_test(<name> SOURCES <files>): the same against libmhe.so and the public headers alone, as an application
+# would be built.
+function(mhe_public_test name)
+    if(NOT MHE_BUILD_TESTS)
+        return()
+    endif()
+    cmake_parse_arguments(arg "" "" "SOURCES" ${ARGN})
+    add_executable(test_${name} ${arg_SOURCES})
+    target_link_libraries(test_${name} PRIVATE mhe::core mhe_flags mhe_cmocka m)
+    target_compile_definitions(test_${name} PRIVATE
+        MHE_TEST_SOURCE_DIR="${CMAKE_SOURCE_DIR}" MHE_TEST_BINARY_DIR="${CMAKE_BINARY_DIR}")
+    set_target_properties(test_${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+    add_test(NAME ${name} COMMAND test_${name})
+    set_tests_properties(${name} PROPERTIES LABELS unit)
     mhe_test_environment(${name})
 endfunction()
 

@@ -30,8 +30,7 @@
 #ifndef MHE_ESTIMATOR_H
 #define MHE_ESTIMATOR_H
 
-#include <mhe/abi.h>
-#include <mhe/host.h>
+#include <mhe/config.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -94,6 +93,12 @@ typedef struct mhe_estimate {
     double latency;           /* s from the call of push to the estimate */
     double evaluation_time;   /* s of it spent on costs, dynamics and their derivatives */
 } mhe_estimate;
+
+/* On a config (mhe/config.h), which is lent and must live longer; its host gets the messages.
+ * Several estimators may be made of one. MHE_E_CONFIG, MHE_E_INPUT, MHE_E_PLUGIN: as below. [cold]
+ */
+MHE_API mhe_status mhe_estimator_create(mhe_config *config, mhe_estimator **estimator,
+                                        mhe_error *err);
 
 /* Opens a config file with `set` [n_set] assignments "path.to.key=value". `host` may be NULL
  * (messages are dropped). MHE_E_CONFIG, MHE_E_INPUT, MHE_E_PLUGIN: err->text says file:line and

@@ -281,15 +281,16 @@ static mhe_status check_run(const struct reader *r) {
 }
 
 /* The tree, then all sections or those of a scope. */
-static mhe_status read_run(const char *path, const char *const *set, int32_t n_set,
-                           mhi_registry *registry, int32_t scope, mhi_run **out, mhe_error *err) {
+static mhe_status read_run(const mhi_run_text *text, const char *path, const char *const *set,
+                           int32_t n_set, mhi_registry *registry, int32_t scope, mhi_run **out,
+                           mhe_error *err) {
     *out = NULL;
     mhi_run *run = calloc(1, sizeof *run);
     const struct reader reader = {run, registry, err, scope};
     if (run == NULL) {
         return no_memory(&reader);
     }
-    mhe_status status = mhi_run_read_tree(run, path, set, n_set, err);
+    mhe_status status = mhi_run_read_tree(run, text, path, set, n_set, err);
     if (scope == SCOPE_MODEL) {
         status = status == MHE_OK ? read_plugin_sections(&reader, MHE_MODEL_IFACE) : status;
     } else {
@@ -308,17 +309,22 @@ static mhe_status read_run(const char *path, const char *const *set, int32_t n_s
 
 mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
                         mhi_registry *registry, mhi_run **run, mhe_error *err) {
-    return read_run(path, set, n_set, registry, SCOPE_ALL, run, err);
+    return read_run(NULL, path, set, n_set, registry, SCOPE_ALL, run, err);
+}
+
+mhe_status mhi_run_parse(const mhi_run_text *text, const char *name, const char *const *set,
+                         int32_t n_set, mhi_registry *registry, mhi_run **run, mhe_error *err) {
+    return read_run(text, name, set, n_set, registry, SCOPE_ALL, run, err);
 }
 
 mhe_status mhi_run_read_model(const char *path, const char *const *set, int32_t n_set,
                               mhi_registry *registry, mhi_run **run, mhe_error *err) {
-    return read_run(path, set, n_set, registry, SCOPE_MODEL, run, err);
+    return read_run(NULL, path, set, n_set, registry, SCOPE_MODEL, run, err);
 }
 
 mhe_status mhi_run_read_base(const char *path, const char *const *set, int32_t n_set,
                              mhi_registry *registry, mhi_run **run, mhe_error *err) {
-    return read_run(path, set, n_set, registry, SCOPE_STEPS, run, err);
+    return read_run(NULL, path, set, n_set, registry, SCOPE_STEPS, run, err);
 }
 
 mhe_status mhi_run_read_costs(mhi_run *run, mhi_registry *registry, const mhi_node *owner,

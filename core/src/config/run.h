@@ -148,11 +148,21 @@ const mhe_option *mhi_run_section(const char *section, int32_t *n);
 /* All sections and their keys in a format of registry.h. */
 void mhi_run_describe(int32_t format, mhi_text *out);
 
+/* A configuration in memory. */
+typedef struct mhi_run_text {
+    const char *text; /* [length] */
+    size_t length;
+    const char *folder; /* that relative paths start from; NULL: the working directory */
+} mhi_run_text;
+
 /* Reads and checks a config with `set` [n_set] assignments applied. Finds every plugin it names in
  * `registry` (the file's plugin_path is searched first, if given). MHE_E_CONFIG, MHE_E_INPUT,
  * MHE_E_PLUGIN: one line, "file:line: ...". Files of the data section are not opened. [cold] */
 mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
                         mhi_registry *registry, mhi_run **run, mhe_error *err);
+/* The same of a text that is called `name`; of the file `name` where `text` is NULL. [cold] */
+mhe_status mhi_run_parse(const mhi_run_text *text, const char *name, const char *const *set,
+                         int32_t n_set, mhi_registry *registry, mhi_run **run, mhe_error *err);
 /* The same of a file with sections of another program's: path, name, tree and the model section are
  * filled, the rest is zero and its keys are not looked at. [cold] */
 mhe_status mhi_run_read_model(const char *path, const char *const *set, int32_t n_set,

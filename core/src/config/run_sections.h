@@ -21,10 +21,11 @@ typedef struct mhi_use_section {
     double weight, sigma, huber; /* costs */
 } mhi_use_section;
 
-/* The file into run->tree, its path, name and folder into `run`; then the assignments `set` [n_set]
- * from the command line, as SECTION.KEY=VALUE (run_tree.c). [cold] */
-mhe_status mhi_run_read_tree(mhi_run *run, const char *path, const char *const *set, int32_t n_set,
-                             mhe_error *err);
+/* The file, or `text` where it is not NULL, into run->tree, its path, name and folder into `run`;
+ * then the assignments `set` [n_set] from the command line, as SECTION.KEY=VALUE (run_tree.c).
+ * [cold] */
+mhe_status mhi_run_read_tree(mhi_run *run, const mhi_run_text *text, const char *path,
+                             const char *const *set, int32_t n_set, mhe_error *err);
 /* The list `channels` of the emg section, and what its keys must agree on (run_emg.c). [cold] */
 mhe_status mhi_run_read_channels(mhi_run *run, mhe_error *err);
 /* That list as YAML, within its section. */

@@ -33,35 +33,49 @@ static mhe_status expand_short_forms(mhi_run *run, mhe_error *err) {
     return status;
 }
 
+/* `folder` from the working directory, which is ours where `folder` is empty. */
+static mhe_status set_folder(mhi_run *run, const char *folder, size_t length, mhe_error *err) {
+    char here[4096];
+    if (length > 0 && folder[0] == '/') {
+        run->dir = mhi_arena_text_n(&run->arena, folder, length);
+    } else if (getcwd(here, sizeof here) == NULL) {
+        return mhe_fail(err, MHE_E_INPUT, "the working directory is not known: %s",
+                        strerror(errno));
+    } else {
+        run->dir = length == 0
+                       ? mhi_arena_text(&run->arena, here)
+                       : mhi_arena_format(&run->arena, "%s/%.*s", here, (int)length, folder);
+    }
+    return run->dir == NULL ? no_memory(err) : MHE_OK;
+}
+
 /* The folder is made absolute, so that a resolved configuration holds wherever it is read. */
-static mhe_status name_run(mhi_run *run, const char *path, mhe_error *err) {
+static mhe_status name_run(mhi_run *run, const mhi_run_text *text, const char *path,
+                           mhe_error *err) {
     const char *slash = strrchr(path, '/');
     const char *base = slash == NULL ? path : slash + 1;
     const char *dot = strrchr(base, '.');
-    size_t n_folder = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
+    const size_t n_base = dot == NULL || dot == base ? strlen(base) : (size_t)(dot - base);
     run->path = mhi_arena_text(&run->arena, path);
-    run->name = mhi_arena_text_n(&run->arena, base,
-                                 dot == NULL || dot == base ? strlen(base) : (size_t)(dot - base));
-    if (path[0] == '/') {
-        run->dir = mhi_arena_text_n(&run->arena, path, n_folder);
-    } else {
-        char here[4096];
-        if (getcwd(here, sizeof here) == NULL) {
-            return mhe_fail(err, MHE_E_INPUT, "the working directory is not known: %s",
-                            strerror(errno));
-        }
-        run->dir = n_folder == 0
-                       ? mhi_arena_text(&run->arena, here)
-                       : mhi_arena_format(&run->arena, "%s/%.*s", here, (int)n_folder, path);
+    run->name = mhi_arena_text_n(&run->arena, base, n_base);
+    if (run->path == NULL || run->name == NULL) {
+        return no_memory(err);
     }
-    return run->path == NULL || run->name == NULL || run->dir == NULL ? no_memory(err) : MHE_OK;
+    if (text != NULL) {
+        const char *folder = text->folder == NULL ? "" : text->folder;
+        return set_folder(run, folder, strlen(folder), err);
+    }
+    const size_t n_folder = slash == NULL ? 0 : slash == path ? 1 : (size_t)(slash - path);
+    return set_folder(run, path, n_folder, err);
 }
 
-mhe_status mhi_run_read_tree(mhi_run *run, const char *path, const char *const *set, int32_t n_set,
-                             mhe_error *err) {
-    mhe_status status = mhi_tree_read(path, &run->tree, err);
+mhe_status mhi_run_read_tree(mhi_run *run, const mhi_run_text *text, const char *path,
+                             const char *const *set, int32_t n_set, mhe_error *err) {
+    mhe_status status = text == NULL
+                            ? mhi_tree_read(path, &run->tree, err)
+                            : mhi_tree_parse(path, text->text, text->length, &run->tree, err);
     if (status == MHE_OK) {
-        status = name_run(run, path, err);
+        status = name_run(run, text, path, err);
     }
     if (status == MHE_OK && mhi_tree_root(run->tree)->kind != MHI_MAPPING) {
         status = mhi_fail_at(err, MHE_E_CONFIG, run->tree, mhi_tree_root(run->tree),

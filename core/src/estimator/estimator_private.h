@@ -8,13 +8,13 @@
 #include "estimator/start.h"
 
 #include <math.h>
+#include <mhe/config.h>
 #include <mhe/estimator.h>
 #include <stddef.h>
 
 struct mhe_estimator {
     const mhe_host *host;
-    mhi_registry *registry; /* NULL where the run was lent */
-    mhi_run *owned_run;
+    mhe_config *config; /* its own; NULL where it was lent */
     const mhi_run *run;
     mhe_description *owned_description; /* NULL where it was lent */
     const mhe_description *description;
