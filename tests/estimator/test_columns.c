@@ -3,13 +3,16 @@
 #include "support.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 static int n_lines;
+static char lines[2048];
 
 static void count_line(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text;
+    (void)host, (void)level;
     n_lines++;
+    (void)snprintf(lines + strlen(lines), sizeof lines - strlen(lines), "%s\n", text);
 }
 
 static const mhe_host host = {.size = sizeof host, .log = count_line};
@@ -28,6 +31,7 @@ static mhe_status match(const mhi_table *table, const mhi_naming *naming, const 
     uint8_t used[16] = {0};
     int32_t found = 0;
     n_lines = 0;
+    lines[0] = '\0';
     return mhi_columns_match(table, naming, names, n, table->n_columns, column, used, &found, &host,
                              err);
 }
@@ -61,8 +65,10 @@ static void slips_and_strangers(void **state) {
     int32_t column[2];
     mhe_error err = {0};
     mhi_table *t = parse("x\nendheader\ntime\tTricepLong\tBRA\n0\t1\t2\n");
-    assert_int_equal(match(t, &muscle, names, 2, column, &err), MHE_E_INPUT);
-    assert_non_null(strstr(err.text, "did you mean 'TricepsLong'"));
+    assert_int_equal(match(t, &muscle, names, 2, column, &err), MHE_OK);
+    assert_int_equal(column[0], -1); /* a slip is told and never a dead end */
+    assert_non_null(strstr(lines, "TricepLong (did you mean 'TricepsLong'?)"));
+    assert_int_equal(n_lines, 2);
     mhi_table_free(t);
     t = parse("x\nendheader\ntime\tforceplate_vertical\tBRA\n0\t1\t2\n");
     assert_int_equal(match(t, &muscle, names, 2, column, &err), MHE_OK);
@@ -73,6 +79,32 @@ static void slips_and_strangers(void **state) {
     t = parse("x\nendheader\ntime\tforceplate_vertical\n0\t1\n");
     assert_int_equal(match(t, &muscle, names, 2, column, &err), MHE_E_INPUT);
     assert_non_null(strstr(err.text, "no column is a muscle"));
+    mhi_table_free(t);
+}
+
+static void other_spellings_and_subjects(void **state) {
+    (void)state;
+    static const mhi_naming marker = {"marker", {"%s"}, 1};
+    const char *names[] = {"ELB.L", "WRI.L"};
+    int32_t column[2];
+    mhe_error err = {0};
+    mhi_table *t = parse("x\nendheader\ntime\twri-l\tAnna:ELB_L\n0\t1\t2\n");
+    assert_int_equal(match(t, &marker, names, 2, column, &err), MHE_OK);
+    assert_int_equal(column[0], 1);
+    assert_int_equal(column[1], 0);
+    assert_int_equal(n_lines, 1);
+    assert_non_null(strstr(lines, "Anna:ELB_L as ELB.L, wri-l as WRI.L"));
+    mhi_table_free(t);
+    /* not unique: neither is taken */
+    t = parse("x\nendheader\ntime\telb_l\tELB-L\tWRI.L\n0\t1\t2\t3\n");
+    assert_int_equal(match(t, &marker, names, 2, column, &err), MHE_OK);
+    assert_int_equal(column[0], -1);
+    assert_int_equal(column[1], 2);
+    mhi_table_free(t);
+    t = parse("x\nendheader\ntime\tA:ELB.L\tB:ELB.L\tA:WRI.L\n0\t1\t2\t3\n");
+    assert_int_equal(match(t, &marker, names, 2, column, &err), MHE_E_INPUT);
+    assert_non_null(strstr(err.text, "two subjects (A, B) have marker ELB.L: name one with "
+                                     "data.subject"));
     mhi_table_free(t);
 }
 
@@ -91,8 +123,8 @@ static void values_between_rows(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(names_patterns_and_numbers),
-                                       cmocka_unit_test(slips_and_strangers),
-                                       cmocka_unit_test(values_between_rows)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(names_patterns_and_numbers), cmocka_unit_test(slips_and_strangers),
+        cmocka_unit_test(other_spellings_and_subjects), cmocka_unit_test(values_between_rows)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

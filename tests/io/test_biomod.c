@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* .bioMod reader: what is read, what is repaired, and what each mistake is called. */
+#include "io/description_builder.h"
 #include "io/model_file.h"
 #include "support.h"
 
 #include <locale.h>
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static mhe_description *parse(const char *text) {
@@ -156,15 +159,93 @@ static void left_handed_frames_are_turned(void **state) {
     mhi_description_free(d);
 }
 
-static void a_left_handed_joint_is_refused(void **state) {
+/* The frame of a body of the tree at q. */
+static mhi_transform frame_of(const mhe_description *d, int32_t body, const double *q) {
+    mhi_transform x = mhi_transform_identity();
+    if (body < 0) {
+        return x;
+    }
+    const mhe_body *b = &d->bodies[body];
+    mhi_transform parent = frame_of(d, b->parent, q), joint, moved;
+    memcpy(joint.r, b->joint_r, sizeof joint.r);
+    memcpy(joint.p, b->joint_p, sizeof joint.p);
+    memcpy(moved.r, b->body_r, sizeof moved.r);
+    memcpy(moved.p, b->body_p, sizeof moved.p);
+    x = mhi_transform_times(&parent, &joint);
+    for (int32_t i = 0; i < b->n_motions; i++) {
+        const mhe_motion *m = &b->motions[i];
+        const double t = mhi_function_value(&m->function, q[m->coordinate]), *a = m->axis;
+        mhi_transform step = mhi_transform_identity();
+        const double skew[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0};
+        for (int r = 0; r < 9 && m->kind == MHE_MOTION_ROTATION; r++) { /* Rodrigues */
+            double square = 0;
+            for (int k = 0; k < 3; k++) {
+                square += skew[r / 3 * 3 + k] * skew[3 * k + r % 3];
+            }
+            step.r[r] = (r % 4 == 0) + sin(t) * skew[r] + (1 - cos(t)) * square;
+        }
+        for (int k = 0; k < 3 && m->kind == MHE_MOTION_TRANSLATION; k++) {
+            step.p[k] = t * a[k];
+        }
+        x = mhi_transform_times(&x, &step);
+    }
+    return mhi_transform_times(&x, &moved);
+}
+
+/* Every point is where the product of the file's matrices, reflections and all, puts it: the frame
+ * of A swaps x and z, then A slides along z by q0 and turns about x by q1; B sits on it, turned. */
+static void a_left_handed_joint_moves_as_the_file_says(void **state) {
     (void)state;
+    mhe_description *d =
+        parse("version 4\nsegment A\n RTinMatrix 1 RT 0 0 1 1  0 1 0 2  1 0 0 3  0 0 0 1\n"
+              " translations z rotations x\nendsegment\n"
+              "segment B\n parent A\n RT 0 0 0 xyz 0 0.5 0\n rotations z\nendsegment\n"
+              "marker M\n parent A\n position 0.1 0.2 0.3\nendmarker\n"
+              "marker N\n parent B\n position 0.1 0.2 0.3\nendmarker\n");
+    const double q[3] = {0.2, 0.7, -0.4};
+    const double on_b[3] = {0.1 * cos(q[2]) - 0.2 * sin(q[2]),
+                            0.5 + 0.1 * sin(q[2]) + 0.2 * cos(q[2]), 0.3};
+    const double in_a[2][3] = {{0.1, 0.2, 0.3}, {on_b[0], on_b[1], on_b[2]}};
+    for (int i = 0; i < 2; i++) {
+        const double *p = in_a[i];
+        const double turned[3] = {p[0], cos(q[1]) * p[1] - sin(q[1]) * p[2],
+                                  q[0] + sin(q[1]) * p[1] + cos(q[1]) * p[2]};
+        const double want[3] = {1 + turned[2], 2 + turned[1], 3 + turned[0]};
+        const mhe_marker *m = &d->markers[i];
+        const mhi_transform x = frame_of(d, m->body, q);
+        double is[3];
+        mhi_transform_point(&x, m->location, is);
+        for (int k = 0; k < 3; k++) {
+            assert_true(fabs(is[k] - want[k]) < 1e-12);
+        }
+    }
+    assert_string_equal(d->warnings[0],
+                        "m.bioMod:2: the frame of body 'A' is left-handed: its z axis is flipped");
+    mhi_description_free(d);
+}
+
+static void what_exports_do_is_read(void **state) {
+    (void)state;
+    static const char bom[] = "\xef\xbb\xbf" ARM;
     mhe_description *d = NULL;
     mhe_error err = {0};
-    const char *moving = "version 4\nsegment A\n"
-                         " RTinMatrix 1 RT 0 0 1 1  0 1 0 2  1 0 0 3  0 0 0 1\n"
-                         " rotations x\nendsegment\n";
-    assert_int_equal(mhi_biomod_parse("m", moving, strlen(moving), &d, &err), MHE_E_INPUT);
-    assert_string_equal(err.text, "m: body 'A' moves in a left-handed frame");
+    assert_int_equal(mhi_model_parse("m.bioMod", bom, sizeof bom - 1, &d, &err), MHE_OK);
+    assert_int_equal(d->n_bodies, 2);
+    mhi_description_free(d);
+    d = parse("VERSION 4\nSEGMENT A\n MASS 3\nENDSEGMENT\n"
+              "MARKER M\n PARENT A\n POSITION 1 2 3\n axestoremove xy\nENDMARKER\n"
+              "marker M\n parent A\n position 4 5 6\nendmarker\n"
+              "customrt F\n parent A\n rt 0 0 0 xyz 0 0 0\nendcustomrt\n");
+    assert_true(d->bodies[0].mass == 3);
+    assert_int_equal(d->n_markers, 1);
+    assert_true(d->markers[0].location[2] == 3);
+    assert_int_equal(d->n_unsupported, 0);
+    assert_int_equal(d->n_warnings, 3);
+    assert_non_null(strstr(d->warnings[0], "m.bioMod:8: axestoremove of marker 'M'"));
+    assert_non_null(strstr(d->warnings[1], "m.bioMod:14: customrt 'F'"));
+    assert_non_null(strstr(d->warnings[2], "m.bioMod:10: marker 'M' is there twice: the first, in "
+                                           "line 5, is used"));
+    mhi_description_free(d);
 }
 
 #define MUSCLE(lines)                                                                       \
@@ -212,7 +293,7 @@ static void mistakes_are_named_with_their_line(void **state) {
          "m:2: body 'A' is its own ancestor"},
         {ARM "marker M\n parent Amr\nendmarker\n",
          "m:13: marker 'M' names an unknown body 'Amr' (did you mean 'Arm'?)"},
-        {ARM "wrapping W\n", "m:14: the wrapping of line 13 has no endwrapping"},
+        {ARM "wrapping W\n", "m:13: the wrapping of line 13 has no endwrapping"},
         {MUSCLE("optimalLength 0\n"), "m:17: muscle 'Long': the optimal fibre length cannot be 0"},
         {MUSCLE("maximalForce -5\n"),
          "m:17: muscle 'Long': the maximal isometric force cannot be -5"},
@@ -236,6 +317,37 @@ static void mistakes_are_named_with_their_line(void **state) {
     }
 }
 
+static void unknown_blocks_are_named(void **state) {
+    (void)state;
+    mhe_description *d =
+        parse(MUSCLE(" Type degrootefatigable\n FatigueParameters\n Type Xia\n rate 1\n"
+                     "endfatigueparameters\n") "glow G\n parent Arm\nENDGLOW\n");
+    assert_int_equal(d->muscles[0].type, MHE_MUSCLE_HILL_DEGROOTE);
+    assert_int_equal(d->n_unsupported, 3);
+    assert_string_equal(d->unsupported[0], "m.bioMod:23: fatigue of muscle 'Long'");
+    assert_string_equal(d->unsupported[1], "m.bioMod:24: FatigueParameters of muscle 'Long'");
+    assert_string_equal(d->unsupported[2], "m.bioMod:29: glow 'G'");
+    mhi_description_free(d);
+}
+
+static void a_million_strange_words_are_a_few_lines(void **state) {
+    (void)state;
+    const size_t n = 1000000;
+    char *text = malloc(2 * n + 64);
+    assert_non_null(text);
+    int used = sprintf(text, "version 4\nsegment A\nendsegment\n");
+    memset(text + used, ' ', 2 * n);
+    for (size_t i = 0; i < n; i++) {
+        text[(size_t)used + 2 * i] = 'x';
+    }
+    text[(size_t)used + 2 * n] = '\0';
+    mhe_description *d = parse(text);
+    assert_int_equal(d->n_warnings, 4);
+    assert_non_null(strstr(d->warnings[3], "999996 more of this kind, the last in line 4"));
+    mhi_description_free(d);
+    free(text);
+}
+
 static void impossible_inertia_is_a_warning(void **state) {
     (void)state;
     mhe_description *d = parse("version 3\nsegment A\n inertia 1 0 0 0 1 0 0 0 3\nendsegment\n");
@@ -251,7 +363,10 @@ int main(void) {
                                        cmocka_unit_test(unsupported_blocks_are_named),
                                        cmocka_unit_test(stray_words_are_skipped),
                                        cmocka_unit_test(left_handed_frames_are_turned),
-                                       cmocka_unit_test(a_left_handed_joint_is_refused),
+                                       cmocka_unit_test(a_left_handed_joint_moves_as_the_file_says),
+                                       cmocka_unit_test(what_exports_do_is_read),
+                                       cmocka_unit_test(unknown_blocks_are_named),
+                                       cmocka_unit_test(a_million_strange_words_are_a_few_lines),
                                        cmocka_unit_test(mistakes_are_named_with_their_line),
                                        cmocka_unit_test(impossible_inertia_is_a_warning)};
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -250,6 +250,116 @@ static void check_refused(size_t at, int value, const char *text) {
     free(data);
 }
 
+/* Sets `n` bytes of a parameter's data. */
+static void set_parameter(uint8_t *data, size_t size, const char *name, const void *bytes,
+                          size_t n) {
+    const size_t length = strlen(name);
+    for (size_t i = 512; i + length + 5 + n < size; i++) {
+        if (data[i - 2] == length && memcmp(data + i, name, length) == 0) {
+            memcpy(data + i + length + 5, bytes, n); /* offset, type, one dimension */
+            return;
+        }
+    }
+    fail_msg("no parameter %s", name);
+}
+
+static void expect_warning(const mhi_table *t, const char *text) {
+    for (int32_t i = 0; i < t->n_warnings; i++) {
+        if (strstr(t->warnings[i], text) != NULL) {
+            return;
+        }
+    }
+    fail_msg("no warning with '%s'", text);
+}
+
+/* Header and parameters say much twice; whichever is sound counts. */
+static void what_contradicts_is_settled(void **state) {
+    (void)state;
+    const float scale = 0.25F, floats = -0.25F;
+    const uint8_t nothing[4] = {0}, beyond[2] = {255, 255};
+    test_c3d c = usual();
+    for (int is_float = 0; is_float < 2; is_float++) {
+        size_t size = 0;
+        c.is_float = is_float;
+        uint8_t *data = test_c3d_make(&c, &size);
+        set_parameter(data, size, "DATA_START", nothing, 2);
+        outcome o = parse(data, size);
+        assert_int_equal(o.status, MHE_OK);
+        check_usual(&o, 1e-3, 8);
+        release(&o);
+        set_parameter(data, size, "DATA_START", beyond, 2);
+        o = parse(data, size);
+        assert_int_equal(o.status, MHE_OK);
+        check_usual(&o, 1e-3, 8);
+        expect_warning(o.points, "POINT:DATA_START contradicts the header");
+        release(&o);
+        free(data);
+        /* the sign of the scale says whether the numbers are floats: the size knows */
+        test_c3d longer = c;
+        longer.n_frames = 60;
+        data = test_c3d_make(&longer, &size);
+        set_parameter(data, size, "SCALE", is_float ? &scale : &floats, 4);
+        o = parse(data, size);
+        assert_int_equal(o.status, MHE_OK);
+        assert_int_equal(o.points->n_rows, 60);
+        assert_true(fabs(o.points->values[9 * 59] - 5.9) < 1e-12 && o.points->values[1] < -0.25);
+        expect_warning(o.points, is_float ? "floats of -0.25 taken" : "integers of 0.25 taken");
+        release(&o);
+        free(data);
+    }
+}
+
+static void unit_words(void **state) {
+    (void)state;
+    static const struct {
+        const char *word;
+        double metres;
+    } words[] = {{"Millimeters", 1e-3}, {"[m]", 1}, {"METERS", 1}, {"centimetre", 1e-2}};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
+        test_c3d c = usual();
+        c.unit = words[i].word;
+        outcome o = read_made(&c);
+        check_usual(&o, words[i].metres, 8);
+        assert_int_equal(o.points->n_warnings, 1); /* the label that is there twice */
+        release(&o);
+    }
+}
+
+/* EMG alone: no points, and neither their rate nor their scale. */
+static void analog_without_points(void **state) {
+    (void)state;
+    const uint8_t nothing[4] = {0};
+    for (int is_float = 0; is_float < 2; is_float++) {
+        test_c3d c = usual();
+        c.n_points = 0;
+        c.is_float = is_float;
+        size_t size = 0;
+        uint8_t *data = test_c3d_make(&c, &size);
+        outcome o = parse(data, size);
+        assert_string_equal(o.err.text, "");
+        assert_null(o.points);
+        assert_int_equal(o.analog->n_rows, 20);
+        assert_true(o.analog->values[0] == (signal_at(0, 0) - 8) * 0.5 * (double)0.001f);
+        release(&o);
+        set_parameter(data, size, "RATE", nothing, 4);
+        memcpy(data + 20, nothing, 4);
+        o = parse(data, size);
+        assert_int_equal(o.status, MHE_E_INPUT); /* nothing says the rate */
+        release(&o);
+        free(data);
+    }
+}
+
+static void latin_labels(void **state) {
+    (void)state;
+    static const char *const french[] = {"\xc9paule", "C7", "T8"};
+    test_c3d c = usual();
+    c.labels = french;
+    outcome o = read_made(&c);
+    assert_string_equal(o.points->labels[0], "\xc3\x89paule");
+    release(&o);
+}
+
 static void wrong_files_are_refused(void **state) {
     (void)state;
     check_refused(1, 'P' + 1, "a.c3d: is no .c3d file");
@@ -293,6 +403,10 @@ int main(void) {
         cmocka_unit_test(what_is_not_said),
         cmocka_unit_test(equal_labels_are_told_apart),
         cmocka_unit_test(a_file_cut_short),
+        cmocka_unit_test(what_contradicts_is_settled),
+        cmocka_unit_test(unit_words),
+        cmocka_unit_test(analog_without_points),
+        cmocka_unit_test(latin_labels),
         cmocka_unit_test(wrong_files_are_refused),
         cmocka_unit_test(files_by_their_ending),
     };

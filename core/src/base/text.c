@@ -62,9 +62,11 @@ static size_t edit_distance(const char *a, const char *b) {
     return row[nb];
 }
 
-const char *mhi_nearest(const char *name, const char *const *names, int32_t n) {
+/* The nearest entry at less than `limit`. */
+static const char *nearest_within(const char *name, const char *const *names, int32_t n,
+                                  size_t limit) {
     const char *best = NULL;
-    size_t best_distance = strlen(name) / 2 + 2;
+    size_t best_distance = limit;
     for (int32_t i = 0; i < n; i++) {
         if (names[i] == NULL) {
             continue;
@@ -76,6 +78,14 @@ const char *mhi_nearest(const char *name, const char *const *names, int32_t n) {
         }
     }
     return best;
+}
+
+const char *mhi_nearest(const char *name, const char *const *names, int32_t n) {
+    return nearest_within(name, names, n, strlen(name) / 2 + 2);
+}
+
+const char *mhi_slip_of(const char *name, const char *const *names, int32_t n) {
+    return nearest_within(name, names, n, strlen(name) / 6 + 2);
 }
 
 const char *mhi_suggest(char *out, size_t size, const char *name, const char *const *names,

@@ -20,6 +20,9 @@ void mhi_text_free(mhi_text *text);
  * enough to be what was meant. NULL entries are passed over. */
 const char *mhi_nearest(const char *name, const char *const *names, int32_t n);
 
+/* The entry that `name` misses by a letter or two: what a slip of the keyboard makes; else NULL. */
+const char *mhi_slip_of(const char *name, const char *const *names, int32_t n);
+
 /* Writes " (did you mean 'x'?)", or with no near name " (valid: a, b, ...)" cut to the room, into
  * out [size]. */
 const char *mhi_suggest(char *out, size_t size, const char *name, const char *const *names,

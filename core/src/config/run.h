@@ -39,6 +39,8 @@ typedef struct mhi_data_section {
                              * excitation-driven and with electrodes 0 (-1 in the file = by default) */
     double marker_outlier;  /* m; 0: none */
     int32_t emg_saturation; /* frames; 0: any EMG is believed */
+    mhe_text_map labels;    /* name in the file: name in the model */
+    const char *subject;    /* whose labels ("NAME:MARKER") are read; NULL: there is one */
 } mhi_data_section;
 
 #define MHI_EMG_LOW_PASS 0

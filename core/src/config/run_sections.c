@@ -58,6 +58,11 @@ static const mhe_option data_options[] = {
     MHE_OPT_INT(mhi_data_section, emg_saturation, 3, 0, 1000, "samples",
                 "After so many frames in a row with the whole EMG at its rails (every channel 0 or "
                 "at least 1, or most at least 1), these samples are missing; 0: never."),
+    MHE_OPT_MAP(mhi_data_section, labels, 0,
+                "Columns that the files call otherwise than the model, {NAME IN FILE: NAME IN "
+                "MODEL}."),
+    MHE_OPT_TEXT(mhi_data_section, subject, 0, NULL,
+                 "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };
 
 static const mhe_option emg_options[] = {

@@ -5,6 +5,9 @@
  * the number of nodes the thing to limit: a short file can stand for an endless tree. */
 #include "config/tree_yaml.h"
 
+#include "io/decode.h"
+
+#include <stdlib.h>
 #include <string.h>
 #include <yaml.h>
 
@@ -263,8 +266,8 @@ static mhe_status check_end(const struct loader *loader, yaml_parser_t *parser, 
     return status;
 }
 
-mhe_status mhi_yaml_parse(const char *name, const char *text, size_t length, int32_t numbered,
-                          mhi_arena *arena, mhi_node **root, mhe_error *err) {
+static mhe_status parse(const char *name, const char *text, size_t length, int32_t numbered,
+                        mhi_arena *arena, mhi_node **root, mhe_error *err) {
     struct loader loader = {.name = name, .numbered = numbered, .arena = arena, .err = err};
     yaml_parser_t parser;
     *root = NULL;
@@ -287,5 +290,20 @@ mhe_status mhi_yaml_parse(const char *name, const char *text, size_t length, int
         yaml_document_delete(&loader.document);
     }
     yaml_parser_delete(&parser);
+    return status;
+}
+
+mhe_status mhi_yaml_parse(const char *name, const char *text, size_t length, int32_t numbered,
+                          mhi_arena *arena, mhi_node **root, mhe_error *err) {
+    mhi_decoded d;
+    *root = NULL;
+    if (!numbered) { /* a command line is in the encoding of the files that it names */
+        return parse(name, text, length, numbered, arena, root, err);
+    }
+    mhe_status status = mhi_decode(name, text, length, &d, err);
+    if (status == MHE_OK) {
+        status = parse(name, d.text, d.length, numbered, arena, root, err);
+        free(d.owned);
+    }
     return status;
 }

@@ -36,20 +36,24 @@ mhe_status mhi_electrodes_columns(const mhi_run *run, const char *source, const 
         char **owned;
     } texts = {.lent = labels}; /* only read */
     const mhi_table table = {.n_labels = n_labels, .labels = texts.owned};
+    int32_t n_found = 0;
     for (int32_t i = 0; i < run->emg.n_channels; i++) {
         const char *name = run->emg.channels[i].name;
         column[i] = mhi_table_find(&table, name);
-        if (column[i] < 0) {
-            char hint[256];
-            return mhe_fail(err, MHE_E_INPUT, "%s: no column for the channel '%s'%s", source, name,
-                            mhi_suggest(hint, sizeof hint, name, labels, n_labels));
-        }
-        for (int32_t k = 0; k < i; k++) {
+        column[i] = column[i] < 0 ? mhi_table_find_alike(&table, name, NULL) : column[i];
+        n_found += column[i] >= 0;
+        for (int32_t k = 0; k < i && column[i] >= 0; k++) {
             if (column[k] == column[i]) {
                 return mhe_fail(err, MHE_E_INPUT, "%s: the channels '%s' and '%s' are one column",
                                 source, run->emg.channels[k].name, name);
             }
         }
+    }
+    if (n_found == 0) {
+        char hint[256];
+        const char *name = run->emg.channels[0].name;
+        return mhe_fail(err, MHE_E_INPUT, "%s: no column for any channel: '%s'%s", source, name,
+                        mhi_suggest(hint, sizeof hint, name, labels, n_labels));
     }
     return MHE_OK;
 }
@@ -165,6 +169,11 @@ void mhi_electrodes_close(mhi_electrodes *e) {
     }
 }
 
+void mhi_electrodes_tell(const mhi_electrodes *e, const mhi_run *run, const char *source,
+                         const mhe_host *host) {
+    mhi_electrodes_tell_absent(run, source, e->column, host);
+}
+
 double mhi_electrodes_filter_delay(const mhi_electrodes *e) {
     return mhi_envelope_delay(e->envelope);
 }
@@ -189,7 +198,7 @@ void mhi_electrodes_push(mhi_electrodes *e, double time, const double *raw) {
     double *out = e->values + (ptrdiff_t)slot * e->n_channels;
     e->times[slot] = time;
     for (int32_t i = 0; i < e->n_channels; i++) {
-        e->raw[i] = raw[e->column[i]];
+        e->raw[i] = e->column[i] < 0 ? NAN : raw[e->column[i]];
     }
     mhi_envelope_step(e->envelope, e->raw, out);
     for (int32_t i = 0; i < e->n_channels; i++) {

@@ -25,12 +25,16 @@ typedef struct mhi_electrodes mhi_electrodes;
 
 /* For the channels of run->emg among columns `labels` [n_labels], sampled at `rate` (Hz); times
  * pushed get data.emg_offset added. `mvc` [channels] is the envelope at maximal contraction.
- * `source` names the columns' file in messages. MHE_E_INPUT: a channel is no column;
- * MHE_E_CONFIG: a muscle is none of the model's or stands at two channels. [cold] */
+ * `source` names the columns' file in messages. MHE_E_INPUT: no channel is a column (one that is
+ * none stays without EMG), or two are one; MHE_E_CONFIG: a muscle is none of the model's or stands
+ * at two channels. [cold] */
 mhe_status mhi_electrodes_open(const mhi_run *run, const mhe_description *model, const char *source,
                                const char *const *labels, int32_t n_labels, double rate,
                                const double *mvc, mhi_electrodes **electrodes, mhe_error *err);
 void mhi_electrodes_close(mhi_electrodes *electrodes);
+/* Tells the host of channels that are no column. [cold] */
+void mhi_electrodes_tell(const mhi_electrodes *electrodes, const mhi_run *run, const char *source,
+                         const mhe_host *host);
 
 /* The next sample, raw [n_labels], NaN where missing. Times that do not increase are passed over.
  * [hot] */
@@ -62,9 +66,12 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
                                int32_t *n_muscles_found, mhi_emg_report *report,
                                const mhe_host *host, mhe_error *err);
 
-/* electrodes_check.c: warnings about what a raw channel should not look like (flat, at its rail,
+/* electrodes_check.c: warnings about channels that are no column (`column` [channels] below 0:
+ * their muscles have no EMG), about what a raw channel should not look like (flat, at its rail,
  * missing), and about the size of the normalised peaks [channels]; MHE_E_INPUT: no scale is like
- * that. `column` [channels]. */
+ * that. */
+void mhi_electrodes_tell_absent(const mhi_run *run, const char *source, const int32_t *column,
+                                const mhe_host *host);
 void mhi_electrodes_check_raw(const mhi_run *run, const mhi_table *table, const int32_t *column,
                               const mhe_host *host);
 mhe_status mhi_electrodes_check_peaks(const mhi_run *run, const char *source, const double *peaks,

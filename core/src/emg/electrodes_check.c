@@ -52,10 +52,25 @@ static struct shares look_at(const mhi_table *table, int32_t column) {
     return (struct shares){(double)missing / n, (double)flat / n, (double)(railed) / n};
 }
 
+void mhi_electrodes_tell_absent(const mhi_run *run, const char *source, const int32_t *column,
+                                const mhe_host *host) {
+    mhi_text absent = {0};
+    for (int32_t i = 0; i < run->emg.n_channels; i++) {
+        if (column[i] < 0) {
+            mhi_text_add(&absent, "%s%s", absent.length == 0 ? "" : ", ",
+                         run->emg.channels[i].name);
+        }
+    }
+    tell(host, source, "no column for the channel", &absent);
+}
+
 void mhi_electrodes_check_raw(const mhi_run *run, const mhi_table *table, const int32_t *column,
                               const mhe_host *host) {
     mhi_text missing = {0}, flat = {0}, railed = {0};
     for (int32_t i = 0; i < run->emg.n_channels && run->emg.process; i++) {
+        if (column[i] < 0) {
+            continue;
+        }
         const struct shares s = look_at(table, column[i]);
         const char *name = run->emg.channels[i].name;
         if (s.missing > FLAT_SHARE) {

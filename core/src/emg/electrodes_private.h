@@ -26,8 +26,8 @@ struct mhi_electrodes {
     mhi_arena arena;
 };
 
-/* Columns of the channels [n_channels] among labels. MHE_E_INPUT: a channel is none, or two are
- * one. */
+/* Columns of the channels [n_channels] among labels, -1 of one that is none. MHE_E_INPUT: all are
+ * none, or two are one. */
 mhe_status mhi_electrodes_columns(const mhi_run *run, const char *source, const char *const *labels,
                                   int32_t n_labels, int32_t *column, mhe_error *err);
 

@@ -11,6 +11,9 @@ static mhe_status smooth_whole(const mhi_run *run, mhi_table *table, const int32
     double *signal = malloc(sizeof(double) * ((size_t)table->n_rows + 1));
     mhe_status status = signal == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
     for (int32_t i = 0; i < run->emg.n_channels && status == MHE_OK; i++) {
+        if (column[i] < 0) {
+            continue;
+        }
         double *values = table->values + column[i];
         mhe_error why = {0};
         for (int32_t k = 0; k < table->n_rows; k++) {
@@ -118,6 +121,7 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
                      : mhi_electrodes_columns(run, table->path, (const char *const *)table->labels,
                                               table->n_labels, column, err);
         if (status == MHE_OK) {
+            mhi_electrodes_tell_absent(run, table->path, column, host);
             mhi_electrodes_check_raw(run, table, column, host);
         }
         free(column);
@@ -135,7 +139,10 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
             }
             mhi_electrodes_at(e, time[k], emg + (ptrdiff_t)k * e->n_muscles);
         }
-        *n_muscles_found = e->n_wires;
+        *n_muscles_found = 0;
+        for (int32_t i = 0; i < e->n_wires; i++) {
+            *n_muscles_found += e->column[e->wires[i].channel] >= 0;
+        }
         *report = (mhi_emg_report){e->n_channels, table->rate, e->offset,
                                    mhi_envelope_delay(e->envelope), e->lag};
         status = mhi_electrodes_check_peaks(run, table->path, e->peaks, host, err);

@@ -54,6 +54,9 @@ mhe_status mhe_emg_open(const char *config, const char *const *set, int32_t n_se
         status = mhi_electrodes_open(e->run, e->model, config, columns, n_columns, rate, mvc,
                                      &e->electrodes, err);
     }
+    if (status == MHE_OK) {
+        mhi_electrodes_tell(e->electrodes, e->run, config, mhi_host_or_silent(host));
+    }
     free(mvc);
     if (status != MHE_OK) {
         mhe_emg_close(e);

@@ -4,6 +4,8 @@
 #include "base/text.h"
 
 #include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,7 +29,7 @@ static void fill(char *out, const char *pattern, const char *name, int32_t numbe
 static int32_t find(const mhi_table *table, const mhi_naming *naming, const char *name,
                     int32_t position) {
     char label[NAME_LENGTH];
-    for (size_t p = 0; p < sizeof naming->patterns / sizeof naming->patterns[0]; p++) {
+    for (size_t p = 0; p < MHI_PATTERNS; p++) {
         if (naming->patterns[p] == NULL) {
             break;
         }
@@ -43,34 +45,100 @@ static int32_t find(const mhi_table *table, const mhi_naming *naming, const char
     return -1;
 }
 
-/* A label that matches nothing but is nearly a name that no column has was meant to be that one. */
-static mhe_status report_unmatched(const mhi_table *table, const mhi_naming *naming,
-                                   const char *const *absent, int32_t n, int32_t n_labels,
-                                   const uint8_t *used, const mhe_host *host, mhe_error *err) {
-    mhi_text extra = {0};
-    mhe_status status = MHE_OK;
-    for (int32_t i = 0; i < n_labels && status == MHE_OK; i++) {
-        if (used[i]) {
+/* What is said of the columns of a table: lists of names. */
+typedef struct lists {
+    mhi_text alike, extra, missing;
+} lists;
+
+static void add_name(mhi_text *list, const char *format, const char *a, const char *b) {
+    mhi_text_add(list, "%s", list->length == 0 ? "" : ", ");
+    mhi_text_add(list, format, a, b);
+}
+
+MHE_PRINTF(3, 4)
+static void tell(const mhe_host *host, const mhi_text *list, const char *format, ...) {
+    char head[512];
+    mhi_text line = {0};
+    if (list->length == 0) {
+        return;
+    }
+    va_list args;
+    va_start(args, format);
+    (void)vsnprintf(head, sizeof head, format, args);
+    va_end(args);
+    mhi_text_add(&line, "%s%s", head, list->data);
+    if (!line.failed) {
+        host->log(host, MHE_LOG_WARNING, line.data);
+    }
+    mhi_text_free(&line);
+}
+
+/* Names without a column whose label is one of them in another spelling. */
+static void match_alike(const mhi_table *table, const mhi_naming *naming, const char *const *names,
+                        int32_t n, int32_t *column, uint8_t *used, lists *told) {
+    for (int32_t i = 0; i < n; i++) {
+        int32_t twice = 0;
+        for (int32_t k = 0; k < n && column[i] < 0; k++) {
+            twice += k != i && mhi_names_alike(names[k], names[i]);
+        }
+        for (size_t p = 0; p < MHI_PATTERNS && naming->patterns[p] != NULL && !twice; p++) {
+            char label[NAME_LENGTH];
+            if (column[i] >= 0 || strstr(naming->patterns[p], "%s") == NULL) {
+                continue;
+            }
+            fill(label, naming->patterns[p], names[i], 0);
+            column[i] = mhi_table_find_alike(table, label, used);
+            if (column[i] >= 0) {
+                used[column[i]] = 1;
+                add_name(&told->alike, "%s as %s", table->labels[column[i]], names[i]);
+            }
+        }
+    }
+}
+
+/* Two labels that are one name of two subjects: nobody can guess which is meant. */
+static mhe_status check_subjects(const mhi_table *table, const mhi_naming *naming, const char *name,
+                                 mhe_error *err) {
+    const char *first = NULL;
+    for (int32_t i = 0; i < table->n_labels; i++) {
+        const char *label = table->labels[i];
+        const size_t length = mhi_label_subject(label);
+        if (length == 0 || !mhi_names_alike(label + length + 1, name)) {
             continue;
         }
-        const char *near = mhi_nearest(table->labels[i], absent, n);
-        if (near != NULL) {
-            status = mhe_fail(err, MHE_E_INPUT,
-                              "%s: column '%s' is no %s of the model (did you mean '%s'?)",
-                              table->path, table->labels[i], naming->what, near);
+        if (first == NULL) {
+            first = label;
+        } else if (mhi_label_subject(first) != length || memcmp(first, label, length) != 0) {
+            return mhe_fail(err, MHE_E_INPUT,
+                            "%s: two subjects (%.*s, %.*s) have %s %s: name one with data.subject",
+                            table->path, (int)mhi_label_subject(first), first, (int)length, label,
+                            naming->what, name);
         }
-        mhi_text_add(&extra, "%s%s", extra.length == 0 ? "" : ", ", table->labels[i]);
     }
-    if (status == MHE_OK && extra.length > 0) {
-        mhi_text line = {0};
-        mhi_text_add(&line, "%s: columns that are no %s of the model are left out: %s", table->path,
-                     naming->what, extra.data);
-        if (!line.failed) {
-            host->log(host, MHE_LOG_WARNING, line.data);
+    return MHE_OK;
+}
+
+static mhe_status list_rest(const mhi_table *table, const mhi_naming *naming,
+                            const char *const *names, int32_t n, int32_t n_labels,
+                            const int32_t *column, const uint8_t *used, lists *told,
+                            mhe_error *err) {
+    const char **absent = calloc((size_t)n + 1, sizeof *absent);
+    mhe_status status = absent == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    for (int32_t i = 0; i < n && status == MHE_OK; i++) {
+        if (column[i] < 0) {
+            absent[i] = names[i];
+            add_name(&told->missing, "%s", names[i], "");
+            status = check_subjects(table, naming, names[i], err);
         }
-        mhi_text_free(&line);
     }
-    mhi_text_free(&extra);
+    for (int32_t i = 0; i < n_labels && status == MHE_OK; i++) {
+        if (!used[i]) {
+            const char *near = mhi_slip_of(table->labels[i], absent, n);
+            add_name(&told->extra, near == NULL ? "%s" : "%s (did you mean '%s'?)",
+                     table->labels[i], near);
+        }
+    }
+    free(absent);
     return status;
 }
 
@@ -78,44 +146,43 @@ mhe_status mhi_columns_match(const mhi_table *table, const mhi_naming *naming,
                              const char *const *names, int32_t n, int32_t n_labels, int32_t *column,
                              uint8_t *used, int32_t *n_found, const mhe_host *host,
                              mhe_error *err) {
-    const char **absent = calloc((size_t)n + 1, sizeof *absent);
-    if (absent == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    mhi_text missing = {0};
+    lists told = {{0}, {0}, {0}};
     *n_found = 0;
     for (int32_t i = 0; i < n; i++) {
         column[i] = find(table, naming, names[i], i);
         if (column[i] >= 0) {
             used[column[i]] = 1;
-            *n_found += 1;
-        } else {
-            absent[i] = names[i];
-            mhi_text_add(&missing, "%s%s", missing.length == 0 ? "" : ", ", names[i]);
         }
+    }
+    if (naming->required) {
+        match_alike(table, naming, names, n, column, used, &told);
+    }
+    for (int32_t i = 0; i < n; i++) {
+        *n_found += column[i] >= 0;
     }
     mhe_status status = MHE_OK;
     if (naming->required) {
-        status = report_unmatched(table, naming, absent, n, n_labels, used, host, err);
+        status = list_rest(table, naming, names, n, n_labels, column, used, &told, err);
         if (status == MHE_OK && *n_found == 0) {
             status = mhe_fail(
                 err, MHE_E_INPUT,
                 "%s: no column is a %s of the model (first column: '%s', the model's first: "
-                "'%s')",
+                "'%s'); data.labels can say which is which",
                 table->path, naming->what, n_labels > 0 ? table->labels[0] : "",
                 n > 0 ? names[0] : "none");
         }
-        if (status == MHE_OK && missing.length > 0) {
-            mhi_text line = {0};
-            mhi_text_add(&line, "%s: no column for %s %s", table->path, naming->what, missing.data);
-            if (!line.failed) {
-                host->log(host, MHE_LOG_WARNING, line.data);
-            }
-            mhi_text_free(&line);
+        if (status == MHE_OK) {
+            tell(host, &told.alike, "%s: columns taken for a %s in another spelling: ", table->path,
+                 naming->what);
+            tell(host, &told.extra,
+                 "%s: columns that are no %s of the model are left out: ", table->path,
+                 naming->what);
+            tell(host, &told.missing, "%s: no column for %s ", table->path, naming->what);
         }
     }
-    mhi_text_free(&missing);
-    free(absent);
+    mhi_text_free(&told.alike);
+    mhi_text_free(&told.extra);
+    mhi_text_free(&told.missing);
     return status;
 }
 

@@ -8,12 +8,15 @@
 
 #include <mhe/host.h>
 
+#define MHI_PATTERNS 6
+
 /* How the columns of one quantity may be called: any of the patterns, where %s stands for the
  * model's name and %d for its number, counted from 0 or 1. */
 typedef struct mhi_naming {
-    const char *what;        /* "marker", "muscle": for messages */
-    const char *patterns[6]; /* NULL-terminated */
-    int32_t required;        /* no column matches: an error; typing slips: an error */
+    const char *what;                   /* "marker", "muscle": for messages */
+    const char *patterns[MHI_PATTERNS]; /* NULL-terminated */
+    int32_t required; /* no column matches: an error; other spellings are taken, and what is left
+                         over or missing is told */
 } mhi_naming;
 
 /* column[i] of names[i] [n], -1 if absent; `*n_found` counts. `used` [n_columns or labels] is

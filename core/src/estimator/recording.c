@@ -20,6 +20,9 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
     status = names == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                            : mhi_recording_check_table(table, host, err);
     if (status == MHE_OK) {
+        status = mhi_recording_name(r, run, table, 3, err);
+    }
+    if (status == MHE_OK) {
         status = mhi_recording_set_times(r, table, err);
     }
     if (status == MHE_OK) {
@@ -45,11 +48,11 @@ static void to_radians(double *values, int32_t n_frames, const mhe_description *
 }
 
 /* Measured joint angles; without markers their times are the frames'. */
-static mhe_status read_angles(mhi_recording *r, const char *path, const mhe_description *d,
+static mhe_status read_angles(mhi_recording *r, const mhi_run *run, const mhe_description *d,
                               const mhe_host *host, mhe_error *err) {
     static const mhi_naming naming = {"coordinate", {"%s", "q_%s"}, 1};
     mhi_table *table = NULL;
-    mhe_status status = mhi_sto_read(path, &table, err);
+    mhe_status status = mhi_sto_read(run->data.angles, &table, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -57,6 +60,9 @@ static mhe_status read_angles(mhi_recording *r, const char *path, const mhe_desc
     int32_t n_found = 0;
     status = names == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                            : mhi_recording_check_table(table, host, err);
+    if (status == MHE_OK) {
+        status = mhi_recording_name(r, run, table, 1, err);
+    }
     if (status == MHE_OK && r->time == NULL) {
         status = mhi_recording_set_times(r, table, err);
     }
@@ -173,7 +179,7 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     }
     r->n_q = d->n_coordinates;
     if (status == MHE_OK && data->angles != NULL) {
-        status = read_angles(r, data->angles, d, host, err);
+        status = read_angles(r, run, d, host, err);
     }
     if (status == MHE_OK && run->data.emg != NULL) {
         status = mhi_recording_read_emg(r, run, d, host, err);
@@ -181,10 +187,11 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     if (status == MHE_OK && run->data.reference != NULL) {
         status = read_reference(r, run->data.reference, d, host, err);
     }
-    if (status == MHE_OK) {
-        mhi_recording_warn_uneven(r, source, host);
-    }
     const int64_t span = (int64_t)run->horizon.window * run->horizon.ratio;
+    if (status == MHE_OK) {
+        mhi_recording_warn_labels(r, run, host);
+        mhi_recording_warn_uneven(r, source, ((double)span + 0.5) / r->rate, host);
+    }
     if (status == MHE_OK && r->n_frames <= span) {
         status = mhe_fail(
             err, MHE_E_INPUT,
@@ -222,5 +229,6 @@ void mhi_recording_free(mhi_recording *r) {
     free(r->reference.activation);
     free(r->reference.excitation);
     free(r->reference.force);
+    free(r->labels_used);
     free(r);
 }

@@ -37,11 +37,12 @@ typedef struct mhi_recording {
     mhi_emg_report emg_report;
     char alignment[512]; /* rates and offsets of the sources in a line, where EMG was processed */
     mhi_reference reference;
+    uint8_t *labels_used; /* [data.labels]; NULL: none was looked for */
 } mhi_recording;
 
-/* Reads the files that run->data names for a model. Columns that match nothing are told to `host`
- * as warnings; a file of which no column matches, or whose column is nearly the name of a missing
- * one, is an error. MHE_E_INPUT. [cold] */
+/* Reads the files that run->data names for a model. Columns that match nothing, and names
+ * without a column, are told to `host` as warnings; a file of which no column matches, or that
+ * holds several people and the config names none, is an error. MHE_E_INPUT. [cold] */
 mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *model,
                               const mhe_host *host, mhi_recording **recording, mhe_error *err);
 /* A reference alone, on its own times; markers and emg are NULL. [cold] */

@@ -108,6 +108,9 @@ mhe_status mhi_recording_read_emg(mhi_recording *r, const mhi_run *run, const mh
         status = mhi_recording_check_table(table, host, err);
     }
     if (status == MHE_OK) {
+        status = mhi_recording_name(r, run, table, 1, err);
+    }
+    if (status == MHE_OK) {
         status =
             (run->emg.n_channels > 0 ? read_electrodes : read_muscles)(r, run, d, table, host, err);
     }

@@ -10,14 +10,23 @@
  * ms; taken as seconds, a window would last minutes. [cold] */
 mhe_status mhi_recording_check_table(const mhi_table *table, const mhe_host *host, mhe_error *err);
 
+/* recording_labels.c: data.subject and data.labels on a table of `width` columns a label.
+ * MHE_E_CONFIG: there is no such subject. [cold] */
+mhe_status mhi_recording_name(mhi_recording *r, const mhi_run *run, mhi_table *table, int32_t width,
+                              mhe_error *err);
+/* Names of data.labels that no file had. [cold] */
+void mhi_recording_warn_labels(const mhi_recording *r, const mhi_run *run, const mhe_host *host);
+
 /* The model's names of coordinates ('q'), muscles ('m') or markers ('k') [n] in one list; freed by
  * the caller, NULL without memory. [cold] */
 const char **mhi_recording_names(const mhe_description *d, int kind, int32_t n);
 
 /* The rows' times become the frames'. [cold] */
 mhe_status mhi_recording_set_times(mhi_recording *r, const mhi_table *table, mhe_error *err);
-/* The estimator takes the first window's mean step for all; says where the steps differ. [cold] */
-void mhi_recording_warn_uneven(const mhi_recording *r, const char *path, const mhe_host *host);
+/* Says where frames are missing, and what a window (s) makes of that; and where the steps differ,
+ * of which the estimator takes the first window's mean. [cold] */
+void mhi_recording_warn_uneven(const mhi_recording *r, const char *path, double window,
+                               const mhe_host *host);
 
 /* One quantity of `n` names, `width` columns each, from a table onto the recording's times:
  * out [n_frames x n width], taken here. [cold] */

@@ -2,6 +2,8 @@
 /* recording_table.c: what the recording's files have in common: times, and columns by name. */
 #include "estimator/recording_private.h"
 
+#include "base/text.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,17 +74,62 @@ mhe_status mhi_recording_check_table(const mhi_table *table, const mhe_host *hos
         table->path, line, 1 / table->rate, table->rate, 1e-3 / table->rate);
 }
 
-void mhi_recording_warn_uneven(const mhi_recording *r, const char *path, const mhe_host *host) {
-    double least = INFINITY, most = 0;
-    for (int32_t k = 0; k + 1 < r->n_frames; k++) {
-        least = fmin(least, r->time[k + 1] - r->time[k]);
-        most = fmax(most, r->time[k + 1] - r->time[k]);
+#define GAP 1.5     /* steps: a longer one is a gap, as in clock.c */
+#define GAPS_TOLD 3 /* then only their number */
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Median step between frames; NaN without. */
+static double median_step(const mhi_recording *r) {
+    const int32_t n = r->n_frames - 1;
+    double median = NAN, *steps = n < 1 ? NULL : malloc(sizeof *steps * (size_t)n);
+    for (int32_t k = 0; k < n && steps != NULL; k++) {
+        steps[k] = r->time[k + 1] - r->time[k];
     }
-    if (most > 1.5 * least) {
-        char line[512];
+    if (steps != NULL) {
+        qsort(steps, (size_t)n, sizeof *steps, by_value);
+        median = steps[n / 2];
+    }
+    free(steps);
+    return median;
+}
+
+void mhi_recording_warn_uneven(const mhi_recording *r, const char *path, double window,
+                               const mhe_host *host) {
+    const double step = median_step(r);
+    double least = INFINITY, most = 0, missing = 0;
+    mhi_text gaps = {0};
+    int32_t n = 0;
+    for (int32_t k = 0; k + 1 < r->n_frames; k++) {
+        const double here = r->time[k + 1] - r->time[k];
+        if (!(here > GAP * step)) {
+            least = fmin(least, here);
+            most = fmax(most, here);
+            continue;
+        }
+        missing += here - step;
+        if (n++ < GAPS_TOLD) {
+            mhi_text_add(&gaps, "%s%.4g s without frames after %.6g s: %s", n == 1 ? "" : "; ",
+                         here - step, r->time[k],
+                         here > window ? "begins again there" : "bridged by the model");
+        }
+    }
+    char line[512];
+    if (n > GAPS_TOLD) {
+        mhi_text_add(&gaps, "; and %d more gaps, together %.4g s", n - GAPS_TOLD, missing);
+    }
+    if (n > 0 && !gaps.failed) {
+        (void)snprintf(line, sizeof line, "%.200s: %.300s", path, gaps.data);
+        host->log(host, MHE_LOG_WARNING, line);
+    }
+    if (most > GAP * least) {
         (void)snprintf(line, sizeof line,
                        "%.400s: the times are uneven (steps of %.4g to %.4g s) but taken as even",
                        path, least, most);
         host->log(host, MHE_LOG_WARNING, line);
     }
+    mhi_text_free(&gaps);
 }

@@ -7,6 +7,7 @@
 #include <ctype.h>
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #define MAX_SEQUENCE 3
 #define RANGES (2 * 2 * MAX_SEQUENCE)
@@ -59,25 +60,36 @@ void mhi_biomod_skip(mhi_biomod *m, mhi_word tag) {
     (void)mhi_lex_all_numbers(&m->lex, NULL, 0);
 }
 
-/* A word that means nothing here, and the numbers behind it. */
-static void skip_unknown(mhi_biomod *m, mhi_word word) {
+/* Steps behind "end<kind>", which is there. */
+static void skip_to_end(mhi_biomod *m, const char *kind) {
+    while (!mhi_lex_ends(mhi_lex_next(&m->lex).text, kind)) {
+    }
+}
+
+/* A word that means nothing here: it opens a block, or numbers follow. */
+static void skip_unknown(mhi_biomod *m, mhi_word word, const char *kind, const char *name) {
+    if (mhi_lex_has_end(&m->lex, word.text, kind)) {
+        mhi_build_unsupported(&m->b, word.line, "%s of %s '%s'", word.text, kind, name);
+        skip_to_end(m, word.text);
+        return;
+    }
     mhi_build_warn(&m->b, word.line, "unknown word '%s' skipped", word.text);
     (void)mhi_lex_all_numbers(&m->lex, NULL, 0);
 }
 
-void mhi_biomod_block(mhi_biomod *m, const char *kind, mhi_word opened,
+void mhi_biomod_block(mhi_biomod *m, const char *kind, const char *name, mhi_word opened,
                       mhi_biomod_property *property, void *item) {
     while (m->b.status == MHE_OK) {
         mhi_word word = mhi_lex_next(&m->lex);
-        int32_t closes = strncmp(word.text, "end", 3) == 0 || strncmp(word.text, "End", 3) == 0;
-        if (closes && mhi_same_word(word.text + 3, kind)) {
+        if (mhi_lex_ends(word.text, kind)) {
             return;
         }
-        if (*word.text == '\0' || mhi_same_word(word.text, "segment") || closes) {
+        if (*word.text == '\0' || mhi_same_word(word.text, "segment") ||
+            strncasecmp(word.text, "end", 3) == 0) {
             mhi_build_fail(&m->b, word.line, "the %s of line %d has no end%s", kind,
                            (int)opened.line, kind);
         } else if (!property(m, item, word)) {
-            skip_unknown(m, word);
+            skip_unknown(m, word, kind, name);
         }
     }
 }
@@ -256,7 +268,7 @@ static void read_segment(mhi_biomod *m, mhi_word tag) {
         return;
     }
     s.draft->body.mass = 1e-5;
-    mhi_biomod_block(m, "segment", tag, segment_property, &s);
+    mhi_biomod_block(m, "segment", s.draft->body.name, tag, segment_property, &s);
     int32_t first = m->b.coordinates.n;
     add_coordinates(m, &s, MHE_MOTION_TRANSLATION, s.translations);
     add_coordinates(m, &s, MHE_MOTION_ROTATION, s.rotations);
@@ -264,17 +276,22 @@ static void read_segment(mhi_biomod *m, mhi_word tag) {
 }
 
 typedef struct marker {
-    const char *parent;
+    const char *name, *parent;
     double position[3];
 } marker;
 
 static int32_t marker_property(mhi_biomod *m, void *item, mhi_word tag) {
-    static const char *const silent[] = {"technical", "anatomical", "axestoremove"};
+    static const char *const silent[] = {"technical", "anatomical"};
     marker *k = item;
     if (mhi_same_word(tag.text, "parent")) {
         k->parent = mhi_biomod_parent(m, tag);
     } else if (mhi_same_word(tag.text, "position")) {
         (void)mhi_lex_numbers(&m->lex, tag.text, k->position, 3);
+    } else if (mhi_same_word(tag.text, "axestoremove")) {
+        mhi_build_warn(&m->b, tag.line,
+                       "axestoremove of marker '%s' is not followed: all three axes are tracked",
+                       k->name);
+        mhi_biomod_skip(m, tag);
     } else if (ONE_OF(tag.text, silent)) {
         mhi_biomod_skip(m, tag);
     } else {
@@ -286,7 +303,8 @@ static int32_t marker_property(mhi_biomod *m, void *item, mhi_word tag) {
 static void read_marker(mhi_biomod *m, mhi_word tag) {
     marker k = {0};
     const char *name = mhi_biomod_name(m, tag);
-    mhi_biomod_block(m, "marker", tag, marker_property, &k);
+    k.name = name;
+    mhi_biomod_block(m, "marker", name, tag, marker_property, &k);
     mhi_build_marker(&m->b, name, k.parent, k.position, tag.line);
 }
 
@@ -311,26 +329,27 @@ static void read_variables(mhi_biomod *m, mhi_word tag) {
     }
 }
 
-/* Blocks with a meaning that a description cannot carry. */
+/* A block of the top level that a description cannot carry: any word whose end follows. */
 static int32_t skip_unsupported(mhi_biomod *m, mhi_word tag) {
     static const char *const blocks[] = {"wrapping",       "imu",      "mimu",          "contact",
                                          "softcontact",    "ligament", "passivetorque", "actuator",
                                          "loopconstraint", "customrt"};
-    if (!ONE_OF(tag.text, blocks)) {
+    const int32_t ended = mhi_lex_has_end(&m->lex, tag.text, "");
+    if (!ended && !ONE_OF(tag.text, blocks)) {
         return 0;
     }
     const char *name = mhi_biomod_name(m, tag);
-    char end[32];
-    (void)snprintf(end, sizeof end, "end%s", tag.text);
-    mhi_word word = mhi_lex_next(&m->lex);
-    while (*word.text != '\0' && !mhi_same_word(word.text, end)) {
-        word = mhi_lex_next(&m->lex);
+    if (!ended) {
+        mhi_build_fail(&m->b, tag.line, "the %s of line %d has no end%s", tag.text, (int)tag.line,
+                       tag.text);
+        return 1;
     }
-    if (*word.text == '\0') {
-        mhi_build_fail(&m->b, word.line, "the %s of line %d has no %s", tag.text, (int)tag.line,
-                       end);
+    if (!mhi_lex_ends(name, tag.text)) {
+        skip_to_end(m, tag.text);
     }
-    if (!mhi_same_word(tag.text, "customrt")) { /* a named frame: nothing moves by it */
+    if (mhi_same_word(tag.text, "customrt")) { /* a named frame: nothing moves by it */
+        mhi_build_warn(&m->b, tag.line, "customrt '%s' is passed over: nothing moves by it", name);
+    } else {
         mhi_build_unsupported(&m->b, tag.line, "%s '%s'", tag.text, name);
     }
     return 1;
@@ -357,7 +376,8 @@ static void read_all(mhi_biomod *m) {
         } else if (ONE_OF(tag.text, silent)) {
             mhi_biomod_skip(m, tag);
         } else if (!mhi_biomod_muscle_block(m, tag) && !skip_unsupported(m, tag)) {
-            skip_unknown(m, tag);
+            mhi_build_warn(&m->b, tag.line, "unknown word '%s' skipped", tag.text);
+            (void)mhi_lex_all_numbers(&m->lex, NULL, 0);
         }
     }
 }

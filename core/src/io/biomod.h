@@ -15,8 +15,9 @@ typedef struct mhi_biomod {
 /* Reads one property of `item`, its tag already taken; 0: the tag is unknown. */
 typedef int32_t mhi_biomod_property(mhi_biomod *m, void *item, mhi_word tag);
 
-/* Reads properties until "end<kind>". Unknown words are skipped with a warning. */
-void mhi_biomod_block(mhi_biomod *m, const char *kind, mhi_word opened,
+/* Reads properties of what is called `name` until "end<kind>". Unknown words are skipped with a
+ * warning; an unknown block, of which "end<word>" follows, is unsupported. */
+void mhi_biomod_block(mhi_biomod *m, const char *kind, const char *name, mhi_word opened,
                       mhi_biomod_property *property, void *item);
 /* A word that follows a tag, "root" and "base" turned into ground where no segment has that name.
  */

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* Blanks comments out, newlines kept; an open comment at the end of the file is worth a warning. */
 static void blank_comments(mhi_biomod_lex *lex, char *text) {
@@ -31,6 +32,16 @@ static void blank_comments(mhi_biomod_lex *lex, char *text) {
     lex->last_line = line;
     if (state == BLOCK_COMMENT) {
         mhi_build_warn(lex->b, opened, "this comment is never closed");
+    }
+}
+
+/* From the back: where each word's next "end..." stands. */
+static void find_ends(mhi_biomod_lex *lex) {
+    int32_t next = lex->words.n;
+    for (int32_t i = lex->words.n - 1; i >= 0; i--) {
+        mhi_word *word = lex->words.items[i];
+        next = strncasecmp(word->text, "end", 3) == 0 ? i : next;
+        word->next_end = next;
     }
 }
 
@@ -66,6 +77,33 @@ void mhi_lex_start(mhi_biomod_lex *lex, mhi_builder *b, const char *text, size_t
             *c++ = '\0';
         }
     }
+    find_ends(lex);
+}
+
+int32_t mhi_lex_ends(const char *word, const char *kind) {
+    return strncasecmp(word, "end", 3) == 0 && mhi_same_word(word + 3, kind);
+}
+
+#define ENDS_MAX 1000 /* no block holds more others */
+
+int32_t mhi_lex_has_end(const mhi_biomod_lex *lex, const char *kind, const char *around) {
+    const mhi_list *words = &lex->words;
+    int32_t at = lex->at;
+    for (int32_t n = 0; n < ENDS_MAX && at < words->n; n++) {
+        at = ((const mhi_word *)words->items[at])->next_end;
+        if (at >= words->n) {
+            return 0;
+        }
+        const char *text = ((const mhi_word *)words->items[at])->text;
+        if (mhi_lex_ends(text, kind)) {
+            return 1;
+        }
+        if (*around != '\0' && mhi_lex_ends(text, around)) {
+            return 0;
+        }
+        at++;
+    }
+    return 0;
 }
 
 mhi_word mhi_lex_peek(const mhi_biomod_lex *lex) {

@@ -8,6 +8,7 @@
 typedef struct mhi_word {
     const char *text; /* "" at the end of the file */
     int32_t line;
+    int32_t next_end; /* place of the next word, this one included, that begins with "end" */
 } mhi_word;
 
 typedef struct mhi_variable {
@@ -28,6 +29,11 @@ void mhi_lex_start(mhi_biomod_lex *lex, mhi_builder *b, const char *text, size_t
 /* The next word without and with taking it. */
 mhi_word mhi_lex_peek(const mhi_biomod_lex *lex);
 mhi_word mhi_lex_next(mhi_biomod_lex *lex);
+
+/* 1 where the word is "end" and then `kind`, letter case free. */
+int32_t mhi_lex_ends(const char *word, const char *kind);
+/* 1 where "end<kind>" follows, and nothing that ends `around` ("" for the top level) before it. */
+int32_t mhi_lex_has_end(const mhi_biomod_lex *lex, const char *kind, const char *around);
 
 /* 1 and the value where the word is a number or arithmetic: + - * / parentheses, pi, $variables. */
 int32_t mhi_lex_value(const mhi_biomod_lex *lex, const char *word, double *value);

@@ -43,11 +43,18 @@ static void read_type(mhi_biomod *m, mhe_muscle *out) {
                  {"hillthelen", MHE_MUSCLE_HILL_THELEN},
                  {"thelen", MHE_MUSCLE_HILL_THELEN},
                  {"hilldegroote", MHE_MUSCLE_HILL_DEGROOTE},
-                 {"degroote", MHE_MUSCLE_HILL_DEGROOTE}};
+                 {"degroote", MHE_MUSCLE_HILL_DEGROOTE},
+                 {"hillthelenfatigable", MHE_MUSCLE_HILL_THELEN},
+                 {"thelenfatigable", MHE_MUSCLE_HILL_THELEN},
+                 {"hilldegrootefatigable", MHE_MUSCLE_HILL_DEGROOTE},
+                 {"degrootefatigable", MHE_MUSCLE_HILL_DEGROOTE}};
     mhi_word word = mhi_lex_next(&m->lex);
     for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
         if (mhi_same_word(word.text, types[i].word)) {
             out->type = types[i].type;
+            if (strstr(types[i].word, "fatigable") != NULL) {
+                mhi_build_unsupported(&m->b, word.line, "fatigue of muscle '%s'", out->name);
+            }
             return;
         }
     }
@@ -123,7 +130,7 @@ static void read_muscle(mhi_biomod *m, mhi_word tag) {
         u->line = tag.line;
         draft->muscle.tendon_slack_length = 0;
         draft->muscle.pennation_angle = 0;
-        mhi_biomod_block(m, "muscle", tag, muscle_property, u);
+        mhi_biomod_block(m, "muscle", draft->muscle.name, tag, muscle_property, u);
     }
 }
 
@@ -132,7 +139,7 @@ int32_t mhi_biomod_muscle_block(mhi_biomod *m, mhi_word tag) {
         group *g = mhi_build_push(&m->b, &m->groups, sizeof *g);
         if (g != NULL) {
             g->name = mhi_biomod_name(m, tag);
-            mhi_biomod_block(m, "musclegroup", tag, group_property, g);
+            mhi_biomod_block(m, "musclegroup", g->name, tag, group_property, g);
         }
     } else if (mhi_same_word(tag.text, "muscle")) {
         read_muscle(m, tag);
@@ -141,7 +148,7 @@ int32_t mhi_biomod_muscle_block(mhi_biomod *m, mhi_word tag) {
         if (v != NULL) {
             v->name = mhi_biomod_name(m, tag);
             v->line = tag.line;
-            mhi_biomod_block(m, "viapoint", tag, via_property, v);
+            mhi_biomod_block(m, "viapoint", v->name, tag, via_property, v);
         }
     } else {
         return 0;

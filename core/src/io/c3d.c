@@ -1,118 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "io/c3d.h"
 
-#include "io/c3d_parameters.h"
+#include "io/c3d_layout.h"
+#include "io/length_unit.h"
 #include "io/slurp.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
-/* What the frames are made of. */
-typedef struct layout {
-    int32_t n_points, n_channels, per_frame; /* per_frame: samples of a channel */
-    int32_t first, n_frames;                 /* number of the first frame, from 1 */
-    int32_t is_float;
-    double scale, rate;
-    size_t start, frame_bytes, word;
-    int64_t lost; /* frames that the header promises and the file does not hold */
-} layout;
+typedef mhi_c3d_layout layout;
 
 static mhe_status fail(const mhi_c3d_file *file, const char *what) {
     return mhe_fail(file->err, MHE_E_INPUT, "%s: %s", file->name, what);
-}
-
-/* One of the header's 16-bit words, counted from 0. */
-static const uint8_t *word(const mhi_c3d_file *file, int32_t i) {
-    return file->data + 2 * i;
-}
-
-static double find_number(const mhi_c3d_file *file, const char *group, const char *name,
-                          double fallback) {
-    const mhi_c3d_parameter p = mhi_c3d_find(file, group, name);
-    return mhi_c3d_number(file, &p, 0, 0, fallback);
-}
-
-/* Counts and places use all 16 bits. */
-static double find_count(const mhi_c3d_file *file, const char *group, const char *name,
-                         double fallback) {
-    const mhi_c3d_parameter p = mhi_c3d_find(file, group, name);
-    return mhi_c3d_number(file, &p, 0, 1, fallback);
-}
-
-/* A frame number kept as two words, low one first. */
-static int64_t long_number(const mhi_c3d_file *file, const char *name, int64_t fallback) {
-    const mhi_c3d_parameter p = mhi_c3d_find(file, "TRIAL", name);
-    if (p.type != 2 || p.n < 2) {
-        return fallback;
-    }
-    return (int64_t)mhi_c3d_number(file, &p, 0, 1, 0) +
-           65536 * (int64_t)mhi_c3d_number(file, &p, 1, 1, 0);
-}
-
-static int32_t count(double value, double most) {
-    return value >= 0 && value <= most ? (int32_t)value : -1; /* NaN is none */
-}
-
-static mhe_status read_frames(const mhi_c3d_file *file, layout *l) {
-    int64_t first = long_number(file, "ACTUAL_START_FIELD", mhi_c3d_uint16(file, word(file, 3)));
-    int64_t last = long_number(file, "ACTUAL_END_FIELD", mhi_c3d_uint16(file, word(file, 4)));
-    if (last < first || first < 0 || last > INT32_MAX) {
-        first = mhi_c3d_uint16(file, word(file, 3));
-        last = mhi_c3d_uint16(file, word(file, 4));
-    }
-    const int64_t said = last - first + 1;
-    const int64_t held =
-        l->start >= file->length ? 0 : (int64_t)((file->length - l->start) / l->frame_bytes);
-    l->lost = said > held ? said - held : 0;
-    const int64_t n = said < held ? said : held;
-    l->first = first < 1 ? 1 : (int32_t)first;
-    l->n_frames = (int32_t)(n < INT32_MAX ? n : INT32_MAX);
-    if (n < 1) {
-        return fail(file, said < 1 ? "holds no frame" : "ends before its first frame");
-    }
-    return MHE_OK;
-}
-
-/* Samples of a channel in a frame follow from the channels' number; the header's own word for it is
- * wrong in some files. */
-static mhe_status read_counts(const mhi_c3d_file *file, layout *l) {
-    const int32_t said = mhi_c3d_uint16(file, word(file, 9));
-    const int32_t words = mhi_c3d_uint16(file, word(file, 2));
-    const double points = find_count(file, "POINT", "USED", mhi_c3d_uint16(file, word(file, 1)));
-    const double channels = find_count(file, "ANALOG", "USED", said > 0 ? words / said : words);
-    l->n_points = count(points, 65535);
-    l->n_channels = words == 0 ? 0 : count(channels, 65535);
-    l->per_frame = l->n_channels > 0 ? words / l->n_channels : 1;
-    if (l->n_points < 0 || l->n_channels < 0 ||
-        (l->n_channels > 0 && l->n_channels * l->per_frame != words)) {
-        return fail(file, "POINT:USED or ANALOG:USED contradicts the header");
-    }
-    l->word = l->is_float ? 4 : 2;
-    l->frame_bytes = l->word * (4 * (size_t)l->n_points + (size_t)words);
-    return l->frame_bytes > 0 ? MHE_OK : fail(file, "holds neither points nor analog channels");
-}
-
-static mhe_status read_layout(const mhi_c3d_file *file, layout *l) {
-    *l = (layout){0};
-    l->scale = find_number(file, "POINT", "SCALE", mhi_c3d_float(file, word(file, 6)));
-    l->is_float = l->scale < 0;
-    l->rate = find_number(file, "POINT", "RATE", 0);
-    if (!(l->rate > 0)) {
-        l->rate = mhi_c3d_float(file, word(file, 10));
-    }
-    if (!(l->rate >= 1e-3 && l->rate <= 1e6)) {
-        return fail(file, "POINT:RATE is missing or no rate in Hz");
-    }
-    const double block =
-        find_count(file, "POINT", "DATA_START", mhi_c3d_uint16(file, word(file, 8)));
-    if (!(block >= 1 && block <= 65535) || !isfinite(l->scale) || l->scale == 0) {
-        return fail(file, "POINT:DATA_START or POINT:SCALE is missing or zero");
-    }
-    l->start = ((size_t)block - 1) * MHI_C3D_BLOCK;
-    const mhe_status status = read_counts(file, l);
-    return status == MHE_OK ? read_frames(file, l) : status;
 }
 
 /* ---- tables ---- */
@@ -171,8 +71,30 @@ static mhe_status make_table(const mhi_c3d_file *file, const layout *l, int32_t 
     for (int32_t k = 0; k < t->n_rows; k++) {
         t->time[k] = (l->first - 1) / l->rate + k / t->rate;
     }
+    static const char what_holds[] = "POINT:SCALE contradicts the header's scale: %s of %g taken";
+    char text[160];
+    if (l->scales_differ) {
+        (void)snprintf(text, sizeof text, what_holds, l->is_float ? "floats" : "integers",
+                       l->scale);
+        warn(t, text);
+    }
+    if (l->starts_differ) {
+        (void)snprintf(
+            text, sizeof text,
+            "POINT:DATA_START contradicts the header: the data are read from byte %zu on",
+            l->start);
+        warn(t, text);
+    }
+    if (l->counts_differ) {
+        warn(t, "ANALOG:USED contradicts the header, whose number of samples is taken");
+    }
+    if (l->by_size) {
+        (void)snprintf(text, sizeof text,
+                       "the header counts to 65535 frames only; by its size the file holds %d",
+                       (int)l->n_frames);
+        warn(t, text);
+    }
     if (l->lost > 0) {
-        char text[128];
         (void)snprintf(text, sizeof text, "the file ends %lld frames too early; %d are there",
                        (long long)l->lost, (int)l->n_frames);
         warn(t, text);
@@ -185,26 +107,19 @@ static double sample(const mhi_c3d_file *file, const layout *l, const uint8_t *a
 }
 
 static void take_unit(const mhi_c3d_file *file, mhi_table *t) {
-    static const struct {
-        const char *name;
-        double metres;
-    } units[] = {{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}};
     const mhi_c3d_parameter p = mhi_c3d_find(file, "POINT", "UNITS");
     char *text = mhi_c3d_text(&p, 0);
     const char *said = text == NULL ? "" : text;
-    size_t found = 3;
-    for (size_t i = 0; i < 3; i++) {
-        found = strcasecmp(said, units[i].name) == 0 ? i : found;
-    }
-    if (found == 3) {
+    mhi_length_unit unit = mhi_length_unit_of((mhi_cell){said, strlen(said)});
+    if (unit.metres == 0) {
         char line[128];
         (void)snprintf(line, sizeof line, "POINT:UNITS is '%.20s', none of mm, cm, m; mm is taken",
                        said);
         warn(t, line);
-        found = 0;
+        unit = (mhi_length_unit){"mm", 1e-3};
     }
-    t->unit = units[found].metres;
-    memcpy(t->unit_name, units[found].name, strlen(units[found].name) + 1);
+    t->unit = unit.metres;
+    memcpy(t->unit_name, unit.name, sizeof t->unit_name);
     free(text);
 }
 
@@ -266,7 +181,7 @@ static mhe_status read_analog(const mhi_c3d_file *file, const layout *l, mhi_tab
         char *format = mhi_c3d_text(&p, 0);
         const int unsigned_ = format != NULL && strcmp(format, "UNSIGNED") == 0;
         free(format);
-        const double general = find_number(file, "ANALOG", "GEN_SCALE", 1);
+        const double general = mhi_c3d_find_number(file, "ANALOG", "GEN_SCALE", 1);
         of_channels(file, "SCALE", 0, 1, scale, l->n_channels);
         of_channels(file, "OFFSET", unsigned_, 0, offset, l->n_channels);
         double *value = (*out)->values;
@@ -293,7 +208,7 @@ mhe_status mhi_c3d_parse(const char *name, const char *data, size_t length, mhi_
     layout l;
     mhe_status status = mhi_c3d_open(&file);
     if (status == MHE_OK) {
-        status = read_layout(&file, &l);
+        status = mhi_c3d_read_layout(&file, &l);
     }
     if (status == MHE_OK && points != NULL && l.n_points > 0) {
         status = read_points(&file, &l, &tables[0]);

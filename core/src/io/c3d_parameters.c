@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "io/c3d_parameters.h"
 
+#include "io/decode.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -183,7 +185,12 @@ char *mhi_c3d_text(const mhi_c3d_parameter *p, int32_t i) {
         text++;
         n--;
     }
-    char *copy = strndup(text, n);
+    mhi_decoded d;
+    if (mhi_decode("", text, n, &d, NULL) != MHE_OK) { /* labels come in any code page */
+        return NULL;
+    }
+    char *copy = strndup(d.text, d.length);
+    free(d.owned);
     for (char *c = copy; c != NULL && *c != '\0'; c++) {
         *c = (unsigned char)*c < ' ' || *c == 0x7f ? '?' : *c; /* a tab would break our tables */
     }

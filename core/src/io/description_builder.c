@@ -73,11 +73,26 @@ static void note(mhi_builder *b, mhi_list *list, const char *text) {
 
 void mhi_build_warn(mhi_builder *b, int32_t line, const char *format, ...) {
     char text[MHE_ERROR_TEXT];
+    if (!mhi_kinds_count(&b->kinds, format, line, b->warnings.n)) {
+        return;
+    }
     va_list args;
     va_start(args, format);
     place_text(b, line, text, format, args);
     va_end(args);
     note(b, &b->warnings, text);
+}
+
+void mhi_build_count_kinds(mhi_builder *b) {
+    for (int32_t i = 0; i < b->kinds.n; i++) {
+        const mhi_kind *kind = &b->kinds.of[i];
+        char rest[128];
+        if (*mhi_kinds_rest(kind, rest, sizeof rest) != '\0' && kind->place < b->warnings.n) {
+            char *line = mhi_arena_format(&b->arena, "%s%s",
+                                          (const char *)b->warnings.items[kind->place], rest);
+            b->warnings.items[kind->place] = line != NULL ? line : b->warnings.items[kind->place];
+        }
+    }
 }
 
 void mhi_build_unsupported(mhi_builder *b, int32_t line, const char *format, ...) {

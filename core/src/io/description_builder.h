@@ -8,6 +8,7 @@
 #define MHI_DESCRIPTION_BUILDER_H
 
 #include "base/arena.h"
+#include "base/kinds.h"
 
 #include <mhe/description.h>
 
@@ -62,6 +63,7 @@ typedef struct mhi_builder {
     double gravity[3];
     mhi_list bodies, coordinates, markers, muscles; /* the drafts above, in file order */
     mhi_list unsupported, warnings;                 /* char */
+    mhi_kinds kinds;                                /* of the warnings */
     mhe_status status;
     mhe_error *err;
 } mhi_builder;
@@ -77,6 +79,9 @@ mhe_status mhi_build_abandon(mhi_builder *b);
 MHE_PRINTF(3, 4) void mhi_build_fail(mhi_builder *b, int32_t line, const char *format, ...);
 MHE_PRINTF(3, 4) void mhi_build_warn(mhi_builder *b, int32_t line, const char *format, ...);
 MHE_PRINTF(3, 4) void mhi_build_unsupported(mhi_builder *b, int32_t line, const char *format, ...);
+
+/* Part of mhi_build_finish: the number of warnings that were only counted. */
+void mhi_build_count_kinds(mhi_builder *b);
 
 /* Appends to a list zeroed memory of `bytes`; NULL, with the status set, when memory is out. */
 void *mhi_build_push(mhi_builder *b, mhi_list *list, size_t bytes);
@@ -97,9 +102,10 @@ void mhi_build_motion(mhi_builder *b, mhi_body_draft *body, int32_t kind, int32_
  * rounding of model files. */
 void mhi_build_check_rotation(mhi_builder *b, const mhi_body_draft *draft, const double r[9]);
 /* Turns the left-handed frames that some converters write (a pair of them cancels) into
- * right-handed ones by flipping z of bodies that do not move; mirrored [n] says which, for points
- * on them. */
-void mhi_build_right_handed(mhi_builder *b, mhe_body *bodies, int32_t n, int32_t *mirrored);
+ * right-handed ones by flipping z of bodies and of what they carry, so that every point is where
+ * the file has it; mirrored [n] says which, for points on them. line [n]: of the file. */
+void mhi_build_right_handed(mhi_builder *b, mhe_body *bodies, int32_t n, const int32_t *line,
+                            int32_t *mirrored);
 
 /* 1 where the two names are the same without regard to letter case. */
 int32_t mhi_same_word(const char *a, const char *b);

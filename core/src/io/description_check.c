@@ -75,14 +75,29 @@ static const char *coordinate_name(const mhi_builder *b, int32_t i, int32_t *lin
     return COORDINATE(b, i)->coordinate.name;
 }
 
-static const char *marker_name(const mhi_builder *b, int32_t i, int32_t *line) {
-    *line = MARKER(b, i)->point.line;
-    return MARKER(b, i)->name;
-}
-
 static const char *muscle_name(const mhi_builder *b, int32_t i, int32_t *line) {
     *line = MUSCLE(b, i)->line;
     return MUSCLE(b, i)->muscle.name;
+}
+
+/* A marker that is there twice: the first is used, as biorbd does it. */
+static void drop_double_markers(mhi_builder *b) {
+    int32_t kept = 0;
+    for (int32_t i = 0; i < b->markers.n; i++) {
+        const mhi_marker_draft *marker = MARKER(b, i);
+        int32_t k = 0;
+        while (k < kept && strcmp(MARKER(b, k)->name, marker->name) != 0) {
+            k++;
+        }
+        if (k < kept) {
+            mhi_build_warn(b, marker->point.line,
+                           "marker '%s' is there twice: the first, in line %d, is used",
+                           marker->name, (int)MARKER(b, k)->point.line);
+        } else {
+            b->markers.items[kept++] = b->markers.items[i];
+        }
+    }
+    b->markers.n = kept;
 }
 
 /* Mass is not negative, inertia symmetric and positive semidefinite; one that no mass distribution
@@ -158,7 +173,7 @@ static void check_muscle(mhi_builder *b, const mhi_muscle_draft *draft) {
 static void check_all(mhi_builder *b) {
     check_unique(b, "body", b->bodies.n, body_name);
     check_unique(b, "coordinate", b->coordinates.n, coordinate_name);
-    check_unique(b, "marker", b->markers.n, marker_name);
+    drop_double_markers(b);
     check_unique(b, "muscle", b->muscles.n, muscle_name);
     for (int32_t i = 0; i < b->bodies.n; i++) {
         mhi_build_check_rotation(b, BODY(b, i), BODY(b, i)->body.joint_r);
@@ -267,7 +282,8 @@ static void place_bodies(mhi_builder *b, mhe_description *d, int32_t *place, int
     mhe_body *bodies = MHI_TAKE(&b->arena, mhe_body, b->bodies.n);
     int32_t *parent = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
     int32_t *number = MHI_TAKE(&b->arena, int32_t, b->coordinates.n);
-    if (bodies == NULL || parent == NULL || number == NULL) {
+    int32_t *line = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
+    if (bodies == NULL || parent == NULL || number == NULL || line == NULL) {
         b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
         return;
     }
@@ -276,13 +292,14 @@ static void place_bodies(mhi_builder *b, mhe_description *d, int32_t *place, int
     for (int32_t i = 0; i < b->bodies.n && b->status == MHE_OK; i++) {
         mhe_body *body = &bodies[place[i]];
         *body = BODY(b, i)->body;
+        line[place[i]] = BODY(b, i)->line;
         body->parent = parent[i] == GROUND ? GROUND : place[parent[i]];
         place_motions(b, BODY(b, i), number, body);
     }
     d->bodies = bodies;
     d->n_bodies = b->bodies.n;
     if (b->status == MHE_OK) {
-        mhi_build_right_handed(b, bodies, d->n_bodies, mirrored);
+        mhi_build_right_handed(b, bodies, d->n_bodies, line, mirrored);
     }
 }
 
@@ -372,6 +389,7 @@ mhe_status mhi_build_finish(mhi_builder *b, mhe_description **description) {
         free(owned);
         return mhi_build_abandon(b);
     }
+    mhi_build_count_kinds(b);
     d->size = sizeof *d;
     d->name = b->name != NULL ? b->name : base_name(b);
     d->source = b->source;

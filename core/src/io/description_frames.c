@@ -28,26 +28,32 @@ void mhi_build_check_rotation(mhi_builder *b, const mhi_body_draft *draft, const
     }
 }
 
-/* joint := S^before (joint body) S^after, body := 1, with S = diag(1, 1, -1). */
-static void flip_frame(mhe_body *body, int32_t before, int32_t after) {
-    mhi_transform joint, moved;
-    const mhi_transform identity = mhi_transform_identity();
-    memcpy(joint.r, body->joint_r, sizeof joint.r);
-    memcpy(joint.p, body->joint_p, sizeof joint.p);
-    memcpy(moved.r, body->body_r, sizeof moved.r);
-    memcpy(moved.p, body->body_p, sizeof moved.p);
-    joint = mhi_transform_times(&joint, &moved);
+/* r, p := S^before (r, p) S^after, with S = diag(1, 1, -1). */
+static void flip_frame(double r[9], double p[3], int32_t before, int32_t after) {
     for (int i = 0; i < 3; i++) {
-        joint.r[6 + i] = before ? -joint.r[6 + i] : joint.r[6 + i];
+        r[6 + i] = before ? -r[6 + i] : r[6 + i];
     }
-    joint.p[2] = before ? -joint.p[2] : joint.p[2];
+    p[2] = before ? -p[2] : p[2];
     for (int i = 0; i < 3; i++) {
-        joint.r[3 * i + 2] = after ? -joint.r[3 * i + 2] : joint.r[3 * i + 2];
+        r[3 * i + 2] = after ? -r[3 * i + 2] : r[3 * i + 2];
     }
-    memcpy(body->joint_r, joint.r, sizeof joint.r);
-    memcpy(body->joint_p, joint.p, sizeof joint.p);
-    memcpy(body->body_r, identity.r, sizeof identity.r);
-    memcpy(body->body_p, identity.p, sizeof identity.p);
+}
+
+/* S X S of every motion: a rotation's axis is a pseudovector. */
+static void flip_motions(mhi_builder *b, mhe_body *body) {
+    mhe_motion *motions = MHI_TAKE(&b->arena, mhe_motion, body->n_motions);
+    if (motions == NULL) {
+        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
+        return;
+    }
+    for (int32_t i = 0; i < body->n_motions; i++) {
+        motions[i] = body->motions[i];
+        const double sign = motions[i].kind == MHE_MOTION_ROTATION ? -1 : 1;
+        motions[i].axis[0] *= sign;
+        motions[i].axis[1] *= sign;
+        motions[i].axis[2] *= -sign;
+    }
+    body->motions = motions;
 }
 
 static void flip_mass(mhe_body *body) {
@@ -58,23 +64,25 @@ static void flip_mass(mhe_body *body) {
     }
 }
 
-void mhi_build_right_handed(mhi_builder *b, mhe_body *bodies, int32_t n, int32_t *mirrored) {
-    for (int32_t i = 0; i < n; i++) {
+/* X = J M B with J = (joint_r, joint_p), B = (body_r, body_p) becomes S^before X S^after as
+ * (S^before J S^within) (S^within M S^within) (S^within B S^after), each factor right-handed. */
+void mhi_build_right_handed(mhi_builder *b, mhe_body *bodies, int32_t n, const int32_t *line,
+                            int32_t *mirrored) {
+    for (int32_t i = 0; i < n && b->status == MHE_OK; i++) {
         mhe_body *body = &bodies[i];
-        int32_t before = body->parent >= 0 ? mirrored[body->parent] : 0;
-        int32_t joint = determinant(body->joint_r) < 0, moved = determinant(body->body_r) < 0;
-        mirrored[i] = before ^ joint ^ moved;
-        if (!before && !joint && !moved) {
-            continue;
+        const int32_t before = body->parent >= 0 ? mirrored[body->parent] : 0;
+        const int32_t joint = determinant(body->joint_r) < 0;
+        const int32_t within = before ^ joint, after = within ^ (determinant(body->body_r) < 0);
+        mirrored[i] = after;
+        flip_frame(body->joint_r, body->joint_p, before, within);
+        flip_frame(body->body_r, body->body_p, within, after);
+        if (within && body->n_motions > 0) {
+            flip_motions(b, body);
         }
-        if (body->n_motions > 0) {
-            mhi_build_fail(b, 0, "body '%s' moves in a left-handed frame", body->name);
-            return;
-        }
-        flip_frame(body, before, mirrored[i]);
-        if (mirrored[i]) {
+        if (after) {
             flip_mass(body);
-            mhi_build_warn(b, 0, "the frame of body '%s' is left-handed: its z axis is flipped",
+            mhi_build_warn(b, line[i],
+                           "the frame of body '%s' is left-handed: its z axis is flipped",
                            body->name);
         }
     }

@@ -15,7 +15,10 @@ mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_e
  * that value, as locked ones of the file are; the rest keep their order. MHE_E_MEMORY. [cold] */
 mhe_status mhi_description_lock(mhe_description *description, const double *at, mhe_error *err);
 
-/* mhi_model_read from memory, for fuzzing and tests; `name` is used in messages. */
+/* mhi_model_read from memory; `name` is used in messages. [cold] */
+mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
+                           mhe_description **description, mhe_error *err);
+/* Of one format, whose text is UTF-8 without a byte-order mark. */
 mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
                           mhe_description **description, mhe_error *err);
 mhe_status mhi_biomod_parse(const char *name, const char *text, size_t length,

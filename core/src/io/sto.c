@@ -2,13 +2,15 @@
 /* .sto and .mot: OpenSim storage (v1, v3) and SIMM motion files, and the same rows with commas. */
 #include "io/table_reader.h"
 
-#include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* What the header says about the table. */
 typedef struct sto_header {
     int32_t absent;            /* the file begins with its labels */
     int32_t n_rows, n_columns; /* -1: nothing said */
+    int32_t has_version;       /* 1 or later: an OpenSim storage, no SIMM motion */
+    int32_t has_degrees;       /* inDegrees is said */
 } sto_header;
 
 static int32_t is_end_of_header(const mhi_table_reader *reader) {
@@ -26,7 +28,10 @@ static int32_t has_end_of_header(const mhi_table_reader *reader) {
 }
 
 static int32_t starts_with_time(const mhi_table_reader *reader) {
-    return reader->n_cells > 1 && mhi_cell_is(reader->cells[0], "time");
+    const mhi_cell first = reader->n_cells > 1 ? reader->cells[0] : (mhi_cell){"", 0};
+    const mhi_cell word = {first.text, first.length < 4 ? first.length : 4};
+    return mhi_cell_is(word, "time") &&
+           (first.length == 4 || strchr(" ([_", first.text[4]) != NULL); /* "time (s)" */
 }
 
 static int32_t looks_like_data(const mhi_table_reader *reader) {
@@ -64,6 +69,10 @@ static mhe_status take_key(mhi_table_reader *reader, mhi_cell key, mhi_cell valu
                                   mhi_cell_show(shown, value));
         }
         reader->table->in_degrees = yes;
+        header->has_degrees = 1;
+    } else if (mhi_cell_is(key, "version")) {
+        double number = 0;
+        header->has_version = mhi_number(value, &number) && number >= 1;
     } else if (mhi_cell_is(key, "DataType") && !mhi_cell_is(value, "double")) {
         return mhi_table_fail(reader,
                               "DataType=%s: only tables of plain numbers (double) are read here",
@@ -116,6 +125,20 @@ static mhe_status read_header(mhi_table_reader *reader, sto_header *header) {
                           "the file ends before the labels ('time' and one for each column)");
 }
 
+/* OpenSim reads a .mot of a version below 1, which is one of SIMM's header, as degrees where it
+ * does not say itself (Common/Storage.cpp). */
+static void settle_degrees(mhi_table_reader *reader, const sto_header *header) {
+    const char *dot = strrchr(reader->table->path, '.');
+    if (header->absent || header->has_version || header->has_degrees || dot == NULL ||
+        strcasecmp(dot, ".mot") != 0) {
+        return;
+    }
+    reader->table->in_degrees = 1;
+    mhi_table_warn(reader,
+                   "a .mot of SIMM's kind (no 'version=1'): angles are taken as degrees, as "
+                   "OpenSim does; 'inDegrees=no' in the header says otherwise");
+}
+
 static mhe_status read_labels(mhi_table_reader *reader, const sto_header *header) {
     char shown[MHI_SHOWN];
     mhe_status status = mhi_table_split_row(reader, header->n_columns);
@@ -159,9 +182,10 @@ static mhe_status read_rows(mhi_table_reader *reader, const sto_header *header) 
 }
 
 static mhe_status read_sto(mhi_table_reader *reader) {
-    sto_header header = {0, -1, -1};
+    sto_header header = {0, -1, -1, 0, 0};
     mhe_status status = read_header(reader, &header);
     if (status == MHE_OK) {
+        settle_degrees(reader, &header);
         status = read_labels(reader, &header);
     }
     return status == MHE_OK ? read_rows(reader, &header) : status;

@@ -46,5 +46,13 @@ void mhi_table_free(mhi_table *table);
  *   where `name` states no quantity: its q.
  * Two columns that fit equally well are none. [any] */
 int32_t mhi_table_find(const mhi_table *table, const char *name);
+/* Where that finds none: the one label that is `name` but for letter case, dots, dashes, blanks and
+ * underscores (as exports change them); -1 where there is none or several. Labels that are `used`
+ * [n_labels] (NULL: none) do not count. [any] */
+int32_t mhi_table_find_alike(const mhi_table *table, const char *name, const uint8_t *used);
+/* 1 where two names are alike in that sense. [any] */
+int32_t mhi_names_alike(const char *a, const char *b);
+/* Length of the subject before a label ("Anna" of "Anna:STER"); 0: it names none. [any] */
+size_t mhi_label_subject(const char *label);
 
 #endif

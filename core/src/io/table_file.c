@@ -34,7 +34,7 @@ mhe_status mhi_table_read(const char *path, mhi_table_body body, mhi_table **tab
     mhi_table_reader reader;
     status = mhi_table_begin(&reader, path, text, length, err);
     if (status == MHE_OK) {
-        reader.spent = text;
+        reader.spent = reader.decoded.owned != NULL ? NULL : text;
         status = body(&reader);
     }
     status = mhi_table_finish(&reader, status, table);

@@ -7,8 +7,6 @@
 #include <string.h>
 #include <strings.h>
 
-#define WARNINGS_MAX 32 /* a file wrong in every row does not fill the screen */
-
 mhe_status mhi_table_fail(mhi_table_reader *reader, const char *format, ...) {
     char text[MHE_ERROR_TEXT];
     va_list args;
@@ -22,20 +20,37 @@ mhe_status mhi_table_fail(mhi_table_reader *reader, const char *format, ...) {
 void mhi_table_warn(mhi_table_reader *reader, const char *format, ...) {
     mhi_table *table = reader->table;
     char text[MHE_ERROR_TEXT], where[MHE_ERROR_TEXT];
-    if (table->n_warnings == WARNINGS_MAX) {
+    if (!mhi_kinds_count(&reader->kinds, format, reader->line_number, table->n_warnings)) {
         return;
-    }
-    if (table->warnings == NULL) {
-        table->warnings = calloc(WARNINGS_MAX, sizeof *table->warnings);
     }
     va_list args;
     va_start(args, format);
     (void)vsnprintf(text, sizeof text, format, args);
     va_end(args);
     int n = snprintf(where, sizeof where, "%s:%d: %s", table->path, reader->line_number, text);
-    char *line = table->warnings != NULL && n > 0 ? strdup(where) : NULL;
+    char **grown = realloc(table->warnings, sizeof *grown * ((size_t)table->n_warnings + 1));
+    table->warnings = grown != NULL ? grown : table->warnings;
+    char *line = grown != NULL && n > 0 ? strdup(where) : NULL;
     if (line != NULL) {
         table->warnings[table->n_warnings++] = line;
+    }
+}
+
+/* Puts the number of what was only counted behind the last one that was told. */
+static void count_kinds(mhi_table_reader *reader) {
+    mhi_table *table = reader->table;
+    for (int32_t i = 0; i < reader->kinds.n; i++) {
+        const mhi_kind *kind = &reader->kinds.of[i];
+        char rest[128], line[MHE_ERROR_TEXT + 128];
+        if (*mhi_kinds_rest(kind, rest, sizeof rest) == '\0' || kind->place >= table->n_warnings) {
+            continue;
+        }
+        (void)snprintf(line, sizeof line, "%s%s", table->warnings[kind->place], rest);
+        char *copy = strdup(line);
+        if (copy != NULL) {
+            free(table->warnings[kind->place]);
+            table->warnings[kind->place] = copy;
+        }
     }
 }
 
@@ -86,7 +101,12 @@ int32_t mhi_table_next(mhi_table_reader *reader) {
 }
 
 int32_t mhi_table_blank(const mhi_table_reader *reader) {
-    return mhi_cell_trim(reader->line).length == 0;
+    for (size_t i = 0; i < reader->line.length; i++) {
+        if (strchr(" \t\r,;", reader->line.text[i]) == NULL) {
+            return 0;
+        }
+    }
+    return 1; /* a spreadsheet's empty row is made of separators */
 }
 
 void mhi_table_ended(mhi_table_reader *reader) {
@@ -100,7 +120,7 @@ void mhi_table_ended(mhi_table_reader *reader) {
     }
 }
 
-static mhe_status add_cell(mhi_table_reader *reader, mhi_cell cell) {
+mhe_status mhi_table_add_cell(mhi_table_reader *reader, mhi_cell cell) {
     if (reader->n_cells == reader->cells_capacity) {
         int32_t capacity = reader->cells_capacity == 0 ? 64 : 2 * reader->cells_capacity;
         mhi_cell *grown = realloc(reader->cells, sizeof *grown * (size_t)capacity);
@@ -121,7 +141,7 @@ mhe_status mhi_table_split(mhi_table_reader *reader, char separator) {
     for (const char *p = at; p <= end && status == MHE_OK; p++) {
         int32_t cut = p == end || *p == separator || (separator == ' ' && *p == '\t');
         if (cut && (separator != ' ' || p > at)) {
-            status = add_cell(reader, (mhi_cell){at, (size_t)(p - at)});
+            status = mhi_table_add_cell(reader, (mhi_cell){at, (size_t)(p - at)});
         }
         at = cut && p < end ? p + 1 : at;
     }
@@ -153,24 +173,56 @@ mhe_status mhi_table_split_row(mhi_table_reader *reader, int32_t expected) {
 
 mhe_status mhi_table_begin(mhi_table_reader *reader, const char *name, const char *text,
                            size_t length, mhe_error *err) {
-    text = length == 0 ? "" : text;
-    *reader = (mhi_table_reader){.at = text, .end = text + length, .err = err};
+    *reader = (mhi_table_reader){.err = err};
     reader->locale = mhi_c_locale_begin();
     reader->table = calloc(1, sizeof *reader->table);
     if (reader->table == NULL || (reader->table->path = strdup(name)) == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
     }
     reader->table->unit = 1;
-    if (length >= 3 && memcmp(text, "\xef\xbb\xbf", 3) == 0) { /* byte order mark */
-        reader->at += 3;
+    const mhe_status status = mhi_decode(name, text, length, &reader->decoded, err);
+    if (status != MHE_OK) {
+        return status;
     }
-    const char *nul = length == 0 ? NULL : memchr(text, '\0', length);
+    reader->at = reader->decoded.text;
+    reader->end = reader->at + reader->decoded.length;
+    const char *nul = memchr(reader->at, '\0', reader->decoded.length);
     if (nul != NULL) {
         return mhe_fail(err, MHE_E_INPUT,
                         "%s:1: holds binary data (a zero byte at %td); plain text is needed", name,
-                        nul - text);
+                        nul - reader->at);
+    }
+    if (reader->decoded.foreign_line > 0) {
+        reader->line_number = reader->decoded.foreign_line;
+        mhi_table_warn(reader, "bytes that are no UTF-8 (%d) are read as Windows-1252",
+                       reader->decoded.foreign_n);
+        reader->line_number = 0;
     }
     return MHE_OK;
+}
+
+mhe_status mhi_table_finish(mhi_table_reader *reader, mhe_status status, mhi_table **table) {
+    if (status == MHE_OK && reader->table->n_rows == 0) {
+        status = mhi_table_fail(reader, "the file ends without a row of data");
+    }
+    if (status == MHE_OK && reader->n_missing > 0) {
+        mhi_table_warn(reader, "%d empty cells are taken as missing values", reader->n_missing);
+    }
+    if (status == MHE_OK) {
+        status = mhi_table_settle_times(reader);
+    }
+    if (status == MHE_OK) {
+        count_kinds(reader);
+    }
+    mhi_c_locale_end(reader->locale);
+    free(reader->cells);
+    free(reader->frame);
+    free(reader->decoded.owned);
+    *table = status == MHE_OK ? reader->table : NULL;
+    if (status != MHE_OK) {
+        mhi_table_free(reader->table);
+    }
+    return status;
 }
 
 mhe_status mhi_table_parse(const char *name, const char *text, size_t length, mhi_table_body body,

@@ -3,6 +3,8 @@
 #ifndef MHI_TABLE_READER_H
 #define MHI_TABLE_READER_H
 
+#include "base/kinds.h"
+#include "io/decode.h"
 #include "io/number.h"
 #include "io/table.h"
 
@@ -14,8 +16,13 @@ typedef struct mhi_table_reader {
     mhi_cell *cells;      /* of the line, trimmed */
     int32_t n_cells, cells_capacity;
     int32_t rows_capacity;
-    int32_t n_missing; /* empty cells */
-    char *spent;       /* text before `at` that may be given back from here on; NULL: it is lent */
+    double *frame;               /* [n_rows] numbers of the frames; NULL: the format has none */
+    int32_t decimals;            /* most that a time is printed with */
+    int32_t n_equal, equal_line; /* rows whose time is that of the row before; the first's line */
+    int32_t n_missing;           /* empty cells */
+    mhi_kinds kinds;             /* of warnings */
+    mhi_decoded decoded;
+    char *spent; /* text before `at` that may be given back from here on; NULL: it is lent */
     mhi_c_locale locale;
     mhe_error *err;
 } mhi_table_reader;
@@ -37,6 +44,8 @@ mhe_status mhi_table_read(const char *path, mhi_table_body body, mhi_table **tab
 int32_t mhi_table_next(mhi_table_reader *reader);
 int32_t mhi_table_blank(const mhi_table_reader *reader); /* the line holds nothing */
 
+/* One more cell, trimmed. MHE_E_MEMORY. */
+mhe_status mhi_table_add_cell(mhi_table_reader *reader, mhi_cell cell);
 /* Cuts the line into cells at `separator`; ' ' stands for any run of blanks and tabs. */
 mhe_status mhi_table_split(mhi_table_reader *reader, char separator);
 /* Cuts it as its content suggests: tabs, else commas, else blanks. Where `expected` cells do not
@@ -49,8 +58,12 @@ void mhi_table_give_back(mhi_table_reader *reader);
 
 /* Takes cells from `first` on as the labels, `width` columns each. */
 mhe_status mhi_table_labels(mhi_table_reader *reader, int32_t first, int32_t width);
-/* Appends a row: time in cell `first`, values behind it. */
+/* Appends a row: time in cell `first`, values behind it. Cells beyond the labels are left out,
+ * cells cut off at the row's end are missing; both are told. */
 mhe_status mhi_table_row(mhi_table_reader *reader, int32_t first);
+/* table_times.c: times that were printed with too few digits become even, and of rows with one time
+ * the later ones go. MHE_E_INPUT: the time stands still. */
+mhe_status mhi_table_settle_times(mhi_table_reader *reader);
 /* A blank line has ended the data: warns where more follows. */
 void mhi_table_ended(mhi_table_reader *reader);
 

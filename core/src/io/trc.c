@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* .trc: marker trajectories as Motion Analysis, Vicon, Mokka and OpenSim write them. */
+#include "io/length_unit.h"
 #include "io/table_reader.h"
 
 #include <math.h>
@@ -9,26 +10,21 @@
 /* What the header says; -1: nothing. */
 typedef struct trc_header {
     int32_t n_frames, n_markers;
+    int32_t n_zeros; /* samples of a marker at exactly 0 0 0 */
 } trc_header;
 
-static const struct {
-    const char *written, *name;
-    double metres;
-} units[] = {{"mm", "mm", 1e-3},          {"cm", "cm", 1e-2},          {"m", "m", 1},
-             {"millimeters", "mm", 1e-3}, {"centimeters", "cm", 1e-2}, {"meters", "m", 1},
-             {"millimetres", "mm", 1e-3}, {"centimetres", "cm", 1e-2}, {"metres", "m", 1}};
-
-static mhe_status take_unit(mhi_table_reader *reader, mhi_cell value) {
+/* Where the unit is none, the distances between markers settle it later (marker_unit.h). */
+static void take_unit(mhi_table_reader *reader, mhi_cell value) {
     mhi_table *table = reader->table;
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
-        if (mhi_cell_is(value, units[i].written)) {
-            table->unit = units[i].metres;
-            (void)snprintf(table->unit_name, sizeof table->unit_name, "%s", units[i].name);
-            return MHE_OK;
-        }
-    }
     char shown[MHI_SHOWN];
-    return mhi_table_fail(reader, "Units '%s' is none of mm, cm, m", mhi_cell_show(shown, value));
+    mhi_length_unit unit = mhi_length_unit_of(value);
+    if (unit.metres == 0) {
+        mhi_table_warn(reader, "Units '%s' is none of mm, cm, m; mm is taken",
+                       mhi_cell_show(shown, value));
+        unit = (mhi_length_unit){"mm", 1e-3};
+    }
+    table->unit = unit.metres;
+    memcpy(table->unit_name, unit.name, sizeof table->unit_name);
 }
 
 /* Drops empty cells, as double tabs and tabs at the end leave them. */
@@ -56,7 +52,8 @@ static mhe_status take_key(mhi_table_reader *reader, mhi_cell key, mhi_cell valu
     double number = -1;
     int32_t is_number = mhi_number(value, &number);
     if (mhi_cell_is(key, "Units")) {
-        return take_unit(reader, value);
+        take_unit(reader, value);
+        return MHE_OK;
     }
     if (mhi_cell_is(key, "DataRate") && is_number && number > 0) {
         reader->table->rate = number;
@@ -89,7 +86,7 @@ static mhe_status read_header(mhi_table_reader *reader, trc_header *header) {
         status = take_key(reader, keys[i], reader->cells[i], header);
     }
     if (status == MHE_OK && reader->table->unit_name[0] == '\0') {
-        status = mhi_table_fail(reader, "the header has no Units; mm, cm or m is needed");
+        take_unit(reader, (mhi_cell){"", 0});
     }
     return status;
 }
@@ -120,17 +117,20 @@ static mhe_status read_labels(mhi_table_reader *reader, const trc_header *header
     return status;
 }
 
-/* A marker is known in all three coordinates or not at all. */
-static void complete_markers(mhi_table *table) {
+/* A marker is known in all three coordinates or not at all; exactly 0 0 0 is how several systems
+ * write that it was not seen. */
+static void complete_markers(mhi_table *table, trc_header *header) {
     double *row = table->values + (size_t)(table->n_rows - 1) * (size_t)table->n_columns;
     for (int32_t i = 0; i < table->n_columns; i += 3) {
-        if (isnan(row[i] + row[i + 1] + row[i + 2])) {
+        const int nowhere = row[i] == 0 && row[i + 1] == 0 && row[i + 2] == 0;
+        header->n_zeros += nowhere && header->n_zeros < INT32_MAX;
+        if (nowhere || isnan(row[i] + row[i + 1] + row[i + 2])) {
             row[i] = row[i + 1] = row[i + 2] = NAN;
         }
     }
 }
 
-static mhe_status read_rows(mhi_table_reader *reader, const trc_header *header) {
+static mhe_status read_rows(mhi_table_reader *reader, trc_header *header) {
     mhi_table *table = reader->table;
     while (mhi_table_next(reader)) {
         if (mhi_table_blank(reader) && table->n_rows == 0) {
@@ -140,11 +140,19 @@ static mhe_status read_rows(mhi_table_reader *reader, const trc_header *header) 
             mhi_table_ended(reader);
             break;
         }
+        const int32_t before = table->n_rows;
         mhe_status status = mhi_table_row(reader, 1);
         if (status != MHE_OK) {
             return status;
         }
-        complete_markers(table);
+        if (table->n_rows > before) {
+            complete_markers(table, header);
+        }
+    }
+    if (header->n_zeros > 0) {
+        reader->line_number = table->line;
+        mhi_table_warn(reader, "%d samples of a marker at exactly 0 0 0 are taken as gaps",
+                       header->n_zeros);
     }
     if (header->n_frames >= 0 && header->n_frames != table->n_rows) {
         mhi_table_warn(reader, "the header says %d frames, there are %d", header->n_frames,
@@ -155,7 +163,7 @@ static mhe_status read_rows(mhi_table_reader *reader, const trc_header *header) 
 }
 
 static mhe_status read_trc(mhi_table_reader *reader) {
-    trc_header header = {-1, -1};
+    trc_header header = {-1, -1, 0};
     mhe_status status = read_header(reader, &header);
     if (status == MHE_OK) {
         status = read_labels(reader, &header);
