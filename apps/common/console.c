@@ -7,9 +7,14 @@
 
 static void log_line(const mhe_host *host, int32_t level, const char *text) {
     static const char *const names[] = {"error", "warning", "note", "debug"};
-    if (level <= MHE_LOG_WARNING) {
-        (void)fprintf(stderr, "%s: %s: %s\n", (const char *)host->data, names[level], text);
+    if (level > MHE_LOG_WARNING) {
+        return;
     }
+    (void)fprintf(stderr, "%s: %s: ", (const char *)host->data, names[level]);
+    for (; *text != '\0'; text++) { /* one line, and no orders to the terminal from a file */
+        (void)fputc((unsigned char)*text < ' ' || *text == 127 ? '?' : *text, stderr);
+    }
+    (void)fputc('\n', stderr);
 }
 
 static const void *no_service(const mhe_host *host, const char *id) {

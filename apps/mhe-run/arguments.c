@@ -10,8 +10,9 @@
 const char arguments_help[] =
     "Estimates joint angles, activations and muscle forces from markers and EMG.\n"
     "\n"
-    "  mhe-run CONFIG.yaml [--out DIR] [--set path.to.key=value]... [--quiet] [--realtime]\n"
-    "  mhe-run --check CONFIG.yaml [--set path.to.key=value]...\n"
+    "  mhe-run CONFIG.yaml [--out DIR] [--set path.to.key=value]... [--quiet] [--realtime] "
+    "[--trust]\n"
+    "  mhe-run --check CONFIG.yaml [--set path.to.key=value]... [--trust]\n"
     "  mhe-run --list-plugins [--json]\n"
     "  mhe-run --describe ID [--json | --markdown]\n"
     "  mhe-run --version | --help\n"
@@ -23,6 +24,7 @@ const char arguments_help[] =
     "estimates are of the newest frame and each ends before the next one; rate, latency, jitter "
     "and\n"
     "missed frames are reported.\n"
+    "--trust lets the config name folders of plugins (plugin_path), whose code then runs.\n"
     "--describe config shows every key of the config file. Results go to DIR, ./out/<config name>\n"
     "unless given. Exit status: 0 done; 1 the run failed (every solve did, too) or was "
     "interrupted; 2 the command line, "
@@ -31,7 +33,7 @@ const char arguments_help[] =
 
 static const char *const words[] = {"--out",          "--set",  "--quiet",    "--check",
                                     "--list-plugins", "--json", "--markdown", "--describe",
-                                    "--version",      "--help", "--realtime"};
+                                    "--version",      "--help", "--realtime", "--trust"};
 
 static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_error *err) {
     const char *word = argv[*i];
@@ -53,6 +55,8 @@ static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_err
         a->quiet = 1;
     } else if (strcmp(word, "--realtime") == 0) {
         a->realtime = 1;
+    } else if (strcmp(word, "--trust") == 0) {
+        a->trust = 1;
     } else if (strcmp(word, "--list-plugins") == 0) {
         a->mode = MODE_LIST;
     } else if (strcmp(word, "--json") == 0) {

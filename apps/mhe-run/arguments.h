@@ -16,6 +16,7 @@ typedef struct arguments {
     int mode;
     int quiet;
     int realtime;
+    int trust;          /* a config may name folders of plugins */
     int32_t format;     /* MHI_FORMAT_* */
     const char *config; /* run, check */
     const char *id;     /* describe */

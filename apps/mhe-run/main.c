@@ -63,6 +63,7 @@ int main(int argc, char **argv) {
     } else if (status == MHE_OK) {
         status = mhi_registry_create(&host, &registry, &err);
         if (status == MHE_OK) {
+            mhi_registry_trust_files(registry, a.trust);
             status = a.mode == MODE_LIST || a.mode == MODE_DESCRIBE
                          ? show_plugins(&a, registry, &err)
                          : run_config(&a, &host, registry, &err);

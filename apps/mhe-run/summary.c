@@ -2,6 +2,7 @@
 #include "summary.h"
 
 #include "measure.h"
+#include "plugin/loader.h"
 
 #include <cJSON.h>
 #include <math.h>
@@ -83,15 +84,36 @@ static void add_realtime(cJSON *root, const summary *s) {
     add_spread(o, "jitter_ms", l->jitter, l->n_jitter);
 }
 
-mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err) {
+static void add_plugin(cJSON *object, const mhe_plugin *plugin) {
+    const char *file = NULL;
+    if (plugin != NULL && cJSON_GetObjectItemCaseSensitive(object, plugin->id) == NULL &&
+        mhi_plugin_library(plugin, &file, NULL) == MHE_OK) {
+        cJSON_AddStringToObject(object, plugin->id, file);
+    }
+}
+
+/* Whose code made the results. */
+static void add_plugins(cJSON *root, const mhi_run *run) {
+    cJSON *o = cJSON_AddObjectToObject(root, "plugins");
+    add_plugin(o, run->model.plugin);
+    add_plugin(o, run->muscle.plugin);
+    add_plugin(o, run->integrator.plugin);
+    add_plugin(o, run->solver.plugin);
+    for (int32_t i = 0; i < run->n_costs; i++) {
+        add_plugin(o, run->costs[i].plugin);
+    }
+}
+
+mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error *err) {
     tally_sort(&s->tally);
     cJSON *root = cJSON_CreateObject();
     cJSON_AddStringToObject(root, "version", MHE_VERSION);
-    cJSON_AddStringToObject(root, "config", config);
+    cJSON_AddStringToObject(root, "config", run->path);
     cJSON *model = cJSON_AddObjectToObject(root, "model");
     add_number(model, "nq", s->info.n_q);
     add_number(model, "nmuscles", s->info.n_muscles);
     add_number(model, "nmarkers", s->info.n_markers);
+    add_plugins(root, run);
     cJSON_AddStringToObject(root, "formulation",
                             s->info.formulation == 0 ? "excitation" : "activation");
     add_number(root, "n_window", s->info.window);

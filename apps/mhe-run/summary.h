@@ -3,7 +3,7 @@
 #ifndef SUMMARY_H
 #define SUMMARY_H
 
-#include "base/text.h"
+#include "config/run.h"
 #include "estimator/errors.h"
 #include "live.h"
 #include "tally.h"
@@ -21,8 +21,8 @@ typedef struct summary {
     const live *live; /* NULL: not by the clock */
 } summary;
 
-/* summary.json; sorts the solve times. `config` is the config file's path. */
-mhe_status summary_json(summary *s, const char *config, mhi_text *out, mhe_error *err);
+/* summary.json; sorts the solve times. */
+mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error *err);
 /* Plain lines for the terminal, after summary_json. */
 void summary_lines(const summary *s, mhi_text *out);
 

@@ -177,7 +177,7 @@ static mhe_status write_texts(tracking *t, mhe_error *err) {
                                     : mhi_outbox_text(t->outbox, "config.yaml", text.data, err);
     mhi_text_free(&text);
     if (status == MHE_OK) {
-        status = summary_json(&t->summary, run->path, &text, err);
+        status = summary_json(&t->summary, run, &text, err);
     }
     if (status == MHE_OK) {
         status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")

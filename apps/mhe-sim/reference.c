@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE /* secure_getenv */
 #include "reference.h"
 
 #include "reference_picture.h"
@@ -52,7 +53,7 @@ void reference_describe(mhi_text *out) {
 
 /* $XDG_CACHE_HOME/mhe, which has to be absolute to count, else ~/.cache/mhe. */
 static const char *cache_folder(mhi_arena *arena) {
-    const char *base = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+    const char *base = secure_getenv("XDG_CACHE_HOME"), *home = secure_getenv("HOME");
     if (base != NULL && base[0] == '/') {
         return mhi_arena_format(arena, "%s/mhe", base);
     }

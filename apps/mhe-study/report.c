@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#define _GNU_SOURCE /* secure_getenv */
 #include "report.h"
 
 #include "config/options.h"
@@ -139,7 +140,7 @@ static mhe_status make_example(session *s, mhe_error *err) {
 /* Debian's own Python has the packages; another one in PATH may not. */
 static const char *python(void) {
     static const char debian[] = "/usr/bin/python3";
-    const char *chosen = getenv("MHE_PYTHON");
+    const char *chosen = secure_getenv("MHE_PYTHON");
     return chosen != NULL && *chosen != '\0' ? chosen
            : access(debian, X_OK) == 0       ? debian
                                              : "python3";

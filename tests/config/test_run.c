@@ -47,6 +47,7 @@ struct outcome {
 static struct outcome read_path(const char *path, const char *const *set, int32_t n_set) {
     struct outcome o = {0};
     assert_int_equal(mhi_registry_create(&host, &o.registry, &o.err), MHE_OK);
+    mhi_registry_trust_files(o.registry, 1);
     o.status = mhi_run_read(path, set, n_set, o.registry, &o.run, &o.err);
     assert_int_equal(o.run == NULL, o.status != MHE_OK);
     return o;
@@ -320,6 +321,25 @@ static void absent_plugin_folder(void **state) {
     release(&o);
 }
 
+/* A folder of plugins is code: a file from elsewhere may not name one, its reader may. */
+static void plugin_folders_need_trust(void **state) {
+    (void)state;
+    struct outcome o = {0};
+    const char *own = "plugin_path=[" TEST_FOLDER "/plugins]";
+    write_file(FILE_NAME, BASE COSTS);
+    assert_int_equal(mhi_registry_create(&host, &o.registry, &o.err), MHE_OK);
+    o.status = mhi_run_read(FILE_NAME, NULL, 0, o.registry, &o.run, &o.err);
+    assert_int_equal(o.status, MHE_E_CONFIG);
+    assert_non_null(strstr(o.err.text, FILE_NAME ":5: plugin_path: '" TEST_FOLDER
+                                                 "/plugins' holds code that would run"));
+    assert_int_equal(mhi_registry_count(o.registry) > 0 &&
+                         strstr(mhi_registry_file(o.registry, 0), TEST_FOLDER) != NULL,
+                     0);
+    o.status = mhi_run_read(FILE_NAME, &own, 1, o.registry, &o.run, &o.err);
+    assert_int_equal(o.status, MHE_OK);
+    release(&o);
+}
+
 static void unreadable_file(void **state) {
     (void)state;
     struct outcome o = read_path(TEST_FOLDER "/absent.yaml", NULL, 0);
@@ -407,6 +427,7 @@ int main(void) {
         cmocka_unit_test(wrong_sections),
         cmocka_unit_test(wrong_plugin_sections),
         cmocka_unit_test(unknown_plugins),
+        cmocka_unit_test(plugin_folders_need_trust),
         cmocka_unit_test(unreadable_file),
         cmocka_unit_test(absent_plugin_folder),
         cmocka_unit_test(relative_file_name),

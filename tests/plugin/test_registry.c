@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* test_registry.c: where plugins are searched, and who wins. The same ids lie in the folders one
  * (1.0.0) and two (2.0.0). */
-#define _XOPEN_SOURCE 700 /* realpath */
+#define _XOPEN_SOURCE 700 /* realpath, mkdtemp */
 #include "plugin/registry.h"
 
 #include "support.h"
@@ -10,6 +10,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #define ONE PLUGIN_DIR "/one"
@@ -19,7 +20,7 @@ static char logged[2048];
 
 static void keep_log(const mhe_host *host, int32_t level, const char *text) {
     (void)host;
-    if (level == MHE_LOG_DEBUG && strlen(logged) + strlen(text) + 2 < sizeof logged) {
+    if (level == MHE_LOG_WARNING && strlen(logged) + strlen(text) + 2 < sizeof logged) {
         strcat(strcat(logged, text), "\n");
     }
 }
@@ -49,6 +50,15 @@ static void the_first_folder_of_the_path_wins_and_it_is_logged(void **state) {
     assert_string_equal(version_found(registry), "1.0.0");
     assert_non_null(
         strstr(logged, "plugin 'test.cost.sample': " ONE "/first.so is used, " TWO "/second.so"));
+    logged[0] = '\0';
+    assert_string_equal(version_found(registry), "1.0.0");
+    assert_string_equal(logged, ""); /* once is enough */
+    const char *listed = NULL;
+    for (int32_t i = 0; i < mhi_registry_refused_count(registry) && listed == NULL; i++) {
+        listed = strstr(mhi_registry_refused(registry, i),
+                        TWO "/second.so: 'test.cost.sample' is taken from " ONE "/first.so");
+    }
+    assert_non_null(listed);
     mhi_registry_free(registry);
     registry = open_registry(TWO ":" ONE);
     assert_string_equal(version_found(registry), "2.0.0");
@@ -84,6 +94,40 @@ static void folders_that_cannot_be_searched_are_told(void **state) {
     assert_int_equal(mhi_registry_add_folder(registry, "/dev/null", &err), MHE_E_CONFIG);
     assert_string_equal(err.text, "plugin folder '/dev/null' is not a folder");
     mhi_registry_free(registry);
+}
+
+/* Whoever has an account here could put code into such a folder. */
+static void folders_of_everybody_are_refused(void **state) {
+    (void)state;
+    char base[] = "/tmp/mhe-test-trust-XXXXXX", path[64], file[128];
+    mhe_error err = {0};
+    assert_non_null(mkdtemp(base));
+    (void)snprintf(path, sizeof path, "%s/plugins", base);
+    (void)snprintf(file, sizeof file, "%s/first.so", path);
+    assert_int_equal(mkdir(path, 0755), 0);
+    assert_int_equal(symlink(ONE "/first.so", file), 0);
+    mhi_registry *registry = open_registry(path);
+    assert_string_equal(version_found(registry), "1.0.0");
+    mhi_registry_free(registry);
+
+    assert_int_equal(chmod(path, 01777), 0); /* sticky: names are safe, but anybody may add one */
+    registry = open_registry(path);
+    assert_non_null(strstr(mhi_registry_refused(registry, 0), "everybody may write to it"));
+    const mhe_plugin *plugin = NULL;
+    assert_int_equal(mhi_registry_find(registry, "test.cost.sample", NULL, &plugin, &err),
+                     MHE_E_PLUGIN);
+    assert_non_null(strstr(err.text, "everybody may write to it"));
+    assert_int_equal(mhi_registry_add_folder(registry, path, &err), MHE_E_CONFIG);
+    mhi_registry_free(registry);
+
+    assert_int_equal(chmod(path, 0755), 0);
+    assert_int_equal(chmod(base, 0777), 0);
+    registry = open_registry(path);
+    assert_non_null(strstr(mhi_registry_refused(registry, 0), "another folder in its place"));
+    mhi_registry_free(registry);
+    assert_int_equal(unlink(file), 0);
+    assert_int_equal(rmdir(path), 0);
+    assert_int_equal(rmdir(base), 0);
 }
 
 static void the_working_directory_is_never_searched(void **state) {
@@ -162,6 +206,7 @@ int main(void) {
         cmocka_unit_test(the_first_folder_of_the_path_wins_and_it_is_logged),
         cmocka_unit_test(a_folder_of_the_config_comes_before_the_path),
         cmocka_unit_test(folders_that_cannot_be_searched_are_told),
+        cmocka_unit_test(folders_of_everybody_are_refused),
         cmocka_unit_test(the_working_directory_is_never_searched),
         cmocka_unit_test(the_build_trees_folder_is_searched),
         cmocka_unit_test(a_wrong_name_or_kind_is_explained),

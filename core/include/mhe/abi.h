@@ -74,7 +74,7 @@ static inline mhe_status mhe_fail(mhe_error *err, mhe_status code, const char *f
         (void)vsnprintf(err->text, sizeof err->text, format, args);
         va_end(args);
         for (char *c = err->text; *c != '\0'; c++) { /* one line, whatever a file put into it */
-            if ((unsigned char)*c < ' ') {
+            if ((unsigned char)*c < ' ' || *c == 127) {
                 *c = ' ';
             }
         }

@@ -26,6 +26,9 @@
  * every solve ends in time with what it has; the long first solve of a window that begins is then
  * spread over the frames that follow.
  *
+ * A config file may come from anywhere, and a plugin is code: a `plugin_path` in the file is
+ * refused. An application that trusts a folder names it itself, by `set` or in MHE_PLUGIN_PATH.
+ *
  * Threads: one estimator belongs to one thread at a time; several estimators are independent. */
 #ifndef MHE_ESTIMATOR_H
 #define MHE_ESTIMATOR_H

@@ -30,6 +30,26 @@ static mhi_node *section_node(const mhi_run *run, const char *name) {
 
 /* ---- sections without a plugin ---- */
 
+/* The folder number i of plugin_path. One given by the caller (--set) is the user's own word; one
+ * that stands in a file may be anybody's. */
+static mhe_status add_plugin_folder(const struct reader *r, const char *folder, int32_t i) {
+    const mhi_node *list = section_node(r->run, "plugin_path"), *node = list->first;
+    for (; i > 0 && node != NULL; i--) {
+        node = node->next;
+    }
+    node = node == NULL ? list : node; /* a single folder need be no list */
+    if (node->line > 0 && !mhi_registry_trusts_files(r->registry)) {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, node,
+                           "plugin_path: '%s' holds code that would run. Where you trust it, give "
+                           "mhe-run --trust, or name the folder in MHE_PLUGIN_PATH",
+                           folder);
+    }
+    mhe_error why = {0};
+    const mhe_status status = mhi_registry_add_folder(r->registry, folder, &why);
+    return status == MHE_OK ? MHE_OK
+                            : mhi_fail_at(r->err, status, r->run->tree, list, "%s", why.text);
+}
+
 static mhe_status read_top(const struct reader *r) {
     mhi_run *run = r->run;
     int32_t n = 0, n_top = 0;
@@ -59,16 +79,11 @@ static mhe_status read_top(const struct reader *r) {
     }
     run->plugin_path = (mhe_text_list){.values = folders, .n = top.plugin_path.n};
     for (int32_t i = 0; i < top.plugin_path.n && status == MHE_OK; i++) {
-        mhe_error why = {0};
         folders[i] = mhi_path_absolute(run->dir, top.plugin_path.values[i], &run->arena);
         if (folders[i] == NULL) {
             return no_memory(r);
         }
-        status = mhi_registry_add_folder(r->registry, folders[i], &why);
-        if (status != MHE_OK) {
-            status = mhi_fail_at(r->err, status, run->tree, section_node(run, "plugin_path"), "%s",
-                                 why.text);
-        }
+        status = add_plugin_folder(r, folders[i], i);
     }
     return status;
 }

@@ -158,7 +158,8 @@ typedef struct mhi_run_text {
 } mhi_run_text;
 
 /* Reads and checks a config with `set` [n_set] assignments applied. Finds every plugin it names in
- * `registry` (the file's plugin_path is searched first, if given). MHE_E_CONFIG, MHE_E_INPUT,
+ * `registry` (plugin_path is searched first, if given; one of the file itself is refused unless the
+ * registry trusts files). MHE_E_CONFIG, MHE_E_INPUT,
  * MHE_E_PLUGIN: one line, "file:line: ...". Files of the data section are not opened. [cold] */
 mhe_status mhi_run_read(const char *path, const char *const *set, int32_t n_set,
                         mhi_registry *registry, mhi_run **run, mhe_error *err);

@@ -16,8 +16,9 @@ static const mhe_option top_options[] = {
     MHE_OPT_ENUM(mhi_top_section, formulation, "excitation", "excitation|activation",
                  "What the muscles are driven by: excitations (activations are states) or "
                  "activations directly."),
-    MHE_OPT_TEXTS(mhi_top_section, plugin_path, 0,
-                  "Folders searched for plugins before the standard ones."),
+    MHE_OPT_TEXTS(
+        mhi_top_section, plugin_path, 0,
+        "Folders searched for plugins before the standard ones; in a file only with --trust."),
 };
 
 static const mhe_option model_options[] = {

@@ -49,13 +49,27 @@ static int32_t find_body(mhi_builder *b, const char *name, int32_t line, const c
     return -2;
 }
 
-/* Fails on the first name given twice. `at(b, i, &line)` is the i-th name. */
+/* Names become columns of tables, lines of messages, words of other programs. */
+static void check_name(mhi_builder *b, const char *what, const char *name, int32_t line) {
+    for (const char *c = name; *c != '\0' && b->status == MHE_OK; c++) {
+        if ((unsigned char)*c < ' ' || *c == 127) {
+            mhi_build_fail(
+                b, line,
+                "%s '%s' has a control character (0x%02x) in its name, which no table of "
+                "results could hold",
+                what, name, (unsigned)(unsigned char)*c);
+        }
+    }
+}
+
+/* Fails on the first name given twice, or unfit. `at(b, i, &line)` is the i-th name. */
 static void check_unique(mhi_builder *b, const char *what, int32_t n,
                          const char *(*at)(const mhi_builder *, int32_t, int32_t *)) {
-    for (int32_t i = 1; i < n && b->status == MHE_OK; i++) {
+    for (int32_t i = 0; i < n && b->status == MHE_OK; i++) {
         int32_t line, earlier;
         const char *name = at(b, i, &line);
-        for (int32_t k = 0; k < i; k++) {
+        check_name(b, what, name, line);
+        for (int32_t k = 0; k < i && b->status == MHE_OK; k++) {
             if (strcmp(at(b, k, &earlier), name) == 0) {
                 mhi_build_fail(b, line, "%s '%s' is there twice (first in line %d)", what, name,
                                (int)earlier);

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#define _XOPEN_SOURCE 700 /* realpath */
+#define _GNU_SOURCE /* realpath, secure_getenv */
 #include "plugin/registry.h"
 
 #include "base/arena.h"
 #include "plugin/loader.h"
 #include "plugin/place.h"
+#include "plugin/trust.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -34,6 +35,7 @@ typedef struct folder {
 typedef struct entry {
     const mhe_plugin *plugin;
     const char *file;
+    const char *hidden; /* warning of another file with the same id, not told yet; or NULL */
 } entry;
 
 struct mhi_registry {
@@ -43,6 +45,7 @@ struct mhi_registry {
     folder *standard;               /* ... then these */
     const char *absent[MHI_PLACES]; /* folders of an installation that are not there */
     int32_t n_absent;
+    int32_t trusts_files;
     int32_t current; /* the two lists below are up to date */
     entry *entries;  /* sorted by id */
     const char **refused;
@@ -51,12 +54,6 @@ struct mhi_registry {
 
 static mhe_status no_memory(mhe_error *err) {
     return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-}
-
-static void log_debug(const mhi_registry *r, const char *text) {
-    if (r->host != NULL && r->host->log != NULL && text != NULL) {
-        r->host->log(r->host, MHE_LOG_DEBUG, text);
-    }
 }
 
 /* ---- folders ---- */
@@ -108,6 +105,10 @@ mhe_status mhi_registry_add_folder(mhi_registry *r, const char *path, mhe_error 
     if (!S_ISDIR(info.st_mode)) {
         return mhe_fail(err, MHE_E_CONFIG, "plugin folder '%s' is not a folder", path);
     }
+    mhe_error why = {0};
+    if (mhi_trust_folder(resolved, &why) != MHE_OK) {
+        return mhe_fail(err, MHE_E_CONFIG, "plugin folder '%s': %s", path, why.text);
+    }
     return find_folder(r->own, resolved) != NULL ? MHE_OK
                                                  : append_folder(r, &r->own, resolved, err);
 }
@@ -127,7 +128,7 @@ static mhe_status add_standard(mhi_registry *r, const char *path, mhe_error *err
 
 /* MHE_PLUGIN_PATH. An empty entry would be the working directory: passed over. */
 static mhe_status add_from_environment(mhi_registry *r, mhe_error *err) {
-    const char *at = getenv("MHE_PLUGIN_PATH");
+    const char *at = secure_getenv("MHE_PLUGIN_PATH");
     while (at != NULL && *at != '\0') {
         size_t n = strcspn(at, ":");
         char *path = mhi_arena_text_n(&r->arena, at, n);
@@ -175,6 +176,14 @@ mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mh
     return status;
 }
 
+void mhi_registry_trust_files(mhi_registry *r, int32_t trusted) {
+    r->trusts_files = trusted;
+}
+
+int32_t mhi_registry_trusts_files(const mhi_registry *r) {
+    return r->trusts_files;
+}
+
 void mhi_registry_free(mhi_registry *r) {
     if (r != NULL) {
         mhi_arena_free(&r->arena);
@@ -211,7 +220,10 @@ static mhe_status load_library(mhi_registry *r, folder *f, const char *name, mhe
     }
     l->file = path;
     mhe_error why = {0};
-    mhe_status status = mhi_loader_open(path, &r->arena, &l->plugins, &l->n_plugins, &why);
+    mhe_status status = mhi_trust_file(path, &why);
+    if (status == MHE_OK) {
+        status = mhi_loader_open(path, &r->arena, &l->plugins, &l->n_plugins, &why);
+    }
     if (status == MHE_OK) {
         return MHE_OK;
     }
@@ -221,13 +233,16 @@ static mhe_status load_library(mhi_registry *r, folder *f, const char *name, mhe
 
 static mhe_status scan_folder(mhi_registry *r, folder *f, mhe_error *err) {
     struct dirent **files = NULL;
-    const int absolute = f->path[0] == '/';
-    int n = absolute ? scandir(f->path, &files, is_shared_object, by_name) : -1;
+    mhe_error why = {0};
+    int n = -1;
+    if (mhi_trust_folder(f->path, &why) == MHE_OK) {
+        n = scandir(f->path, &files, is_shared_object, by_name);
+        (void)mhe_fail(&why, MHE_E_PLUGIN, "%s", n < 0 ? strerror(errno) : "");
+    }
     mhe_status status = MHE_OK;
     if (n < 0) {
-        const char *why = absolute ? strerror(errno) : "not an absolute path";
         library *l = append_library(r, f);
-        char *line = mhi_arena_format(&r->arena, "%s: %s", f->path, why);
+        char *line = mhi_arena_format(&r->arena, "%s: %s", f->path, why.text);
         if (l == NULL || line == NULL) {
             return no_memory(err);
         }
@@ -250,16 +265,26 @@ static int by_id(const void *a, const void *b) {
     return strcmp(((const entry *)a)->plugin->id, ((const entry *)b)->plugin->id);
 }
 
-/* Adds a plugin unless its id was met before: the first in search order wins. */
-static void enter(mhi_registry *r, const mhe_plugin *plugin, const char *file) {
+/* Adds a plugin unless its id was met before: the first in search order wins, and the other one is
+ * listed among the refused. */
+static mhe_status enter(mhi_registry *r, const mhe_plugin *plugin, const char *file,
+                        mhe_error *err) {
     for (int32_t i = 0; i < r->n_entries; i++) {
-        if (strcmp(r->entries[i].plugin->id, plugin->id) == 0) {
-            log_debug(r, mhi_arena_format(&r->arena, "plugin '%s': %s is used, %s is not",
-                                          plugin->id, r->entries[i].file, file));
-            return;
+        entry *first = &r->entries[i];
+        if (strcmp(first->plugin->id, plugin->id) == 0) {
+            const char *line = mhi_arena_format(&r->arena, "%s: '%s' is taken from %s", file,
+                                                plugin->id, first->file);
+            first->hidden = mhi_arena_format(&r->arena, "plugin '%s': %s is used, %s is not",
+                                             plugin->id, first->file, file);
+            if (line == NULL || first->hidden == NULL) {
+                return no_memory(err);
+            }
+            r->refused[r->n_refused++] = line;
+            return MHE_OK;
         }
     }
-    r->entries[r->n_entries++] = (entry){plugin, file};
+    r->entries[r->n_entries++] = (entry){.plugin = plugin, .file = file};
+    return MHE_OK;
 }
 
 static mhe_status build_lists(mhi_registry *r, mhe_error *err) {
@@ -272,7 +297,7 @@ static mhe_status build_lists(mhi_registry *r, mhe_error *err) {
     }
     r->n_entries = r->n_refused = 0;
     r->entries = MHI_TAKE(&r->arena, entry, n_plugins);
-    r->refused = MHI_TAKE(&r->arena, const char *, n_libraries);
+    r->refused = MHI_TAKE(&r->arena, const char *, n_libraries + n_plugins);
     if (r->entries == NULL || r->refused == NULL) {
         return no_memory(err);
     }
@@ -282,7 +307,10 @@ static mhe_status build_lists(mhi_registry *r, mhe_error *err) {
                 r->refused[r->n_refused++] = l->refused;
             }
             for (int32_t k = 0; k < l->n_plugins; k++) {
-                enter(r, l->plugins[k], l->file);
+                mhe_status status = enter(r, l->plugins[k], l->file, err);
+                if (status != MHE_OK) {
+                    return status;
+                }
             }
         }
     }
@@ -342,6 +370,14 @@ static mhe_status not_found(mhi_registry *r, const char *id, const char *iface, 
     return status;
 }
 
+/* A plugin that takes the id of another is what the user wanted, or an attack. */
+static void warn_once(const mhi_registry *r, entry *found) {
+    if (found->hidden != NULL && r->host != NULL && r->host->log != NULL) {
+        r->host->log(r->host, MHE_LOG_WARNING, found->hidden);
+    }
+    found->hidden = NULL;
+}
+
 mhe_status mhi_registry_find(mhi_registry *r, const char *id, const char *iface,
                              const mhe_plugin **plugin, mhe_error *err) {
     *plugin = NULL;
@@ -358,6 +394,7 @@ mhe_status mhi_registry_find(mhi_registry *r, const char *id, const char *iface,
                                 iface);
             }
             *plugin = p;
+            warn_once(r, &r->entries[i]);
             return MHE_OK;
         }
     }
