@@ -1,0 +1,209 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* ellipsoid.c: strings over an ellipsoid.
+ *
+ * Divided by the half axes, the ellipsoid is the unit sphere; straight lines, planes and tangency
+ * stay what they are. There all planes through both ends make circles, whose tight strings are
+ * known; their true lengths, a fan of them, show where the shortest string lies, and where the
+ * geodesic is to be looked for. */
+#include "geodesic.h"
+
+#include "../vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define FAN 16        /* planes, as half planes about the straight line */
+#define SAMPLES 6     /* of an arc's length */
+#define TRIED 3       /* strings solved exactly at most */
+#define NEAR 0.03     /* of the length: planes that are not worse than that may hold the shortest */
+#define OUTSIDE 1e-9
+#define HALF_TURN 3.141592653589793
+
+typedef struct fan {
+    double size[3];
+    double p[3], s[3];         /* scaled ends */
+    double u[3], e[2][3];      /* along the line; towards it from the centre, and across both */
+    double off, before, after; /* distance of the line; of the ends from its nearest point */
+    double length;
+} fan;
+
+/* Points where lines from p are tangent: a circle of the scaled frame. */
+typedef struct contact_circle {
+    double size[3], centre[3], axes[2][3];
+} contact_circle;
+
+static void circle_contact(const void *data, double turn, double *a, double *a_turn) {
+    const contact_circle *c = data;
+    double x = cos(turn), y = sin(turn);
+    for (int i = 0; i < 3; i++) {
+        a[i] = c->size[i] * (c->centre[i] + x * c->axes[0][i] + y * c->axes[1][i]);
+        a_turn[i] = c->size[i] * (x * c->axes[1][i] - y * c->axes[0][i]);
+    }
+}
+
+static void frame_across(const double *u, double *e0, double *e1) {
+    double least[3] = {0, 0, 0};
+    int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2)
+                                     : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
+    least[k] = 1;
+    cross3(u, least, e0);
+    double norm = sqrt(dot3(e0, e0));
+    for (int i = 0; i < 3; i++) {
+        e0[i] /= norm;
+    }
+    cross3(u, e0, e1);
+}
+
+static void contact_circle_of(const fan *f, contact_circle *c) {
+    double square = dot3(f->p, f->p), radius = sqrt(1 - 1 / square), u[3];
+    for (int i = 0; i < 3; i++) {
+        u[i] = f->p[i] / sqrt(square);
+        c->centre[i] = f->p[i] / square;
+    }
+    frame_across(u, c->axes[0], c->axes[1]);
+    for (int i = 0; i < 3; i++) {
+        c->axes[0][i] *= radius;
+        c->axes[1][i] *= radius;
+    }
+    memcpy(c->size, f->size, sizeof c->size);
+}
+
+/* WRAP_*: whether the straight line crosses the ellipsoid. */
+static int fan_of(const wrap_surface *surface, const double *p, const double *s, fan *f) {
+    double d[3], foot[3];
+    for (int i = 0; i < 3; i++) {
+        f->size[i] = surface->size[i];
+        f->p[i] = p[i] / surface->size[i];
+        f->s[i] = s[i] / surface->size[i];
+        d[i] = f->s[i] - f->p[i];
+    }
+    if (dot3(f->p, f->p) < 1 + OUTSIDE || dot3(f->s, f->s) < 1 + OUTSIDE) {
+        return WRAP_INSIDE;
+    }
+    f->length = sqrt(dot3(d, d));
+    f->before = -dot3(f->p, d) / f->length;
+    f->after = dot3(f->s, d) / f->length;
+    if (!(f->before > 0) || !(f->after > 0)) {
+        return WRAP_NONE;
+    }
+    for (int i = 0; i < 3; i++) {
+        f->u[i] = d[i] / f->length;
+        foot[i] = f->p[i] + f->before * f->u[i];
+    }
+    f->off = sqrt(dot3(foot, foot));
+    if (f->off >= 1) {
+        return WRAP_NONE;
+    }
+    if (f->off > 1e-12) {
+        for (int i = 0; i < 3; i++) {
+            f->e[0][i] = foot[i] / f->off;
+        }
+        cross3(f->u, f->e[0], f->e[1]);
+    } else {
+        frame_across(f->u, f->e[0], f->e[1]);
+    }
+    return WRAP_CROSSED;
+}
+
+/* The tight string over the circle of one half plane, towards cos(angle) e0 + sin(angle) e1. */
+typedef struct fan_string {
+    double length, arc;
+    double a[3]; /* scaled */
+    double apex; /* of its middle, along the axis asked for */
+} fan_string;
+
+static void fan_string_at(const fan *f, double angle, int axis, fan_string *out) {
+    static const double node[SAMPLES / 2] = {0.238619186083197, 0.661209386466265,
+                                             0.932469514203152};
+    static const double weight[SAMPLES / 2] = {0.467913934572691, 0.360761573048139,
+                                               0.171324492379170};
+    double w[3], c = cos(angle), depth = f->off * c;
+    double radius = sqrt(1 - f->off * f->off + depth * depth), centre[3], b[3];
+    for (int i = 0; i < 3; i++) {
+        w[i] = c * f->e[0][i] + sin(angle) * f->e[1][i];
+        centre[i] = f->p[i] + f->before * f->u[i] - depth * w[i];
+    }
+    double from = hypot(f->before, depth), to = hypot(f->after, depth);
+    double start = HALF_TURN - atan2(depth, f->before) - acos(fmin(1, radius / from));
+    double end = atan2(depth, f->after) + acos(fmin(1, radius / to));
+    double middle = 0.5 * (start + end), half = 0.5 * (start - end), arc = 0;
+    for (int k = 0; k < SAMPLES; k++) {
+        double x = k % 2 ? node[k / 2] : -node[k / 2], rate = 0;
+        double at = middle + half * x, ac = cos(at), as = sin(at);
+        for (int i = 0; i < 3; i++) {
+            double v = f->size[i] * (ac * w[i] - as * f->u[i]);
+            rate += v * v;
+        }
+        arc += weight[k / 2] * sqrt(rate);
+    }
+    out->arc = arc * half * radius;
+    double d1 = 0, d2 = 0;
+    for (int i = 0; i < 3; i++) {
+        out->a[i] = centre[i] + radius * (cos(start) * f->u[i] + sin(start) * w[i]);
+        b[i] = centre[i] + radius * (cos(end) * f->u[i] + sin(end) * w[i]);
+        d1 += pow(f->size[i] * (out->a[i] - f->p[i]), 2);
+        d2 += pow(f->size[i] * (b[i] - f->s[i]), 2);
+    }
+    out->length = sqrt(d1) + sqrt(d2) + out->arc;
+    out->apex = axis < 0 ? 0
+                         : centre[axis] + radius * (cos(middle) * f->u[axis] +
+                                                    sin(middle) * w[axis]);
+}
+
+static int solve_from(const wrap_surface *surface, const double *p, const double *s, const fan *f,
+                      double angle, wrap_string *out) {
+    contact_circle circle;
+    fan_string guess;
+    double from[3], turn;
+    contact_circle_of(f, &circle);
+    fan_string_at(f, angle, -1, &guess);
+    for (int i = 0; i < 3; i++) {
+        from[i] = guess.a[i] - circle.centre[i];
+    }
+    string_start start = {.contact = circle_contact,
+                          .data = &circle,
+                          .turn = atan2(dot3(from, circle.axes[1]), dot3(from, circle.axes[0])),
+                          .arc = guess.arc};
+    return string_shoot(surface, p, s, &start, &turn, out);
+}
+
+int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
+                   wrap_string *out) {
+    fan f;
+    int needs = fan_of(surface, p, s, &f), found = 0, tried = 0;
+    if (needs != WRAP_CROSSED) {
+        return needs;
+    }
+    fan_string fan_strings[FAN];
+    double least = INFINITY, shortest = INFINITY;
+    int allowed[FAN], axis = surface->side_axis, any = 0;
+    for (int k = 0; k < FAN; k++) {
+        fan_string_at(&f, k * (2 * HALF_TURN / FAN), axis, &fan_strings[k]);
+        allowed[k] = axis < 0 || fan_strings[k].apex * surface->side_sign >= 0;
+        any |= allowed[k];
+    }
+    for (int k = 0; k < FAN; k++) {
+        allowed[k] |= !any;
+        if (allowed[k]) {
+            least = fmin(least, fan_strings[k].length);
+        }
+    }
+    for (int k = 0; k < FAN && tried < TRIED; k++) {
+        int before = (k + FAN - 1) % FAN, after = (k + 1) % FAN;
+        double length = fan_strings[k].length;
+        if (!allowed[k] || length > least * (1 + NEAR) ||
+            (allowed[before] && fan_strings[before].length < length) ||
+            (allowed[after] && fan_strings[after].length <= length)) {
+            continue;
+        }
+        wrap_string string;
+        tried++;
+        if (solve_from(surface, p, s, &f, k * (2 * HALF_TURN / FAN), &string) == 0 &&
+            wrap_length(&string) < shortest) {
+            shortest = wrap_length(&string);
+            *out = string;
+            found = 1;
+        }
+    }
+    return found ? needs : WRAP_UNSOLVED;
+}

@@ -1,0 +1,265 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* geodesic.c: the geodesic equation x'' = -II(x', x') n with its Jacobi fields, by extrapolation of
+ * the modified midpoint rule (Hairer, Norsett & Wanner, Solving Ordinary Differential Equations I,
+ * II.9), and strings by shooting along it. */
+#include "geodesic.h"
+
+#include "../vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define STATES 10
+#define LEVELS 8         /* of extrapolation: 2, 4 .. 16 substeps */
+#define ACCURACY 1e-13   /* of a step, relative to the surface's size */
+#define STEP 1.0         /* longest step, as an angle by the curvature where it begins */
+#define MAX_HALVINGS 12
+#define MAX_STEPS 400
+#define MAX_NEWTON 40
+#define MAX_TURN 0.5     /* rad, sizes: longest step of Newton's method */
+#define SOLVED 2e-13     /* miss, relative to the surface's size */
+
+static void ellipsoid_shape(const double *size, const double *x, const double *t, const double *b,
+                            surface_shape *out) {
+    double w[3], g[3], bend = 0, twist = 0, cross = 0;
+    for (int i = 0; i < 3; i++) {
+        w[i] = 1 / (size[i] * size[i]);
+        g[i] = x[i] * w[i];
+        bend += t[i] * t[i] * w[i];
+    }
+    double square = dot3(g, g), inverse = 1 / sqrt(square);
+    for (int i = 0; i < 3; i++) {
+        out->normal[i] = g[i] * inverse;
+    }
+    out->gauss = w[0] * w[1] * w[2] / (square * square);
+    out->bend = bend * inverse;
+    if (b != NULL) {
+        for (int i = 0; i < 3; i++) {
+            twist += t[i] * b[i] * w[i];
+            cross += b[i] * b[i] * w[i];
+        }
+        out->twist = twist * inverse;
+        out->cross_bend = cross * inverse;
+    }
+}
+
+/* size: radius of the tube, of the ring */
+static void torus_shape(const double *size, const double *x, const double *t, const double *b,
+                        surface_shape *out) {
+    double rho = sqrt(x[0] * x[0] + x[1] * x[1]), e[2] = {x[0] / rho, x[1] / rho};
+    double off = rho - size[1], distance = sqrt(off * off + x[2] * x[2]);
+    double around = off / (distance * rho), meridian = 1 / distance; /* curvatures */
+    out->normal[0] = off / distance * e[0];
+    out->normal[1] = off / distance * e[1];
+    out->normal[2] = x[2] / distance;
+    out->gauss = around * meridian;
+    double turn = e[0] * t[1] - e[1] * t[0]; /* share of t around the axis */
+    out->bend = meridian + (around - meridian) * turn * turn;
+    if (b != NULL) {
+        double turn_b = e[0] * b[1] - e[1] * b[0];
+        out->twist = (around - meridian) * turn * turn_b;
+        out->cross_bend = meridian + (around - meridian) * turn_b * turn_b;
+    }
+}
+
+void surface_shape_at(const wrap_surface *surface, const double *x, const double *t,
+                      const double *b, surface_shape *out) {
+    if (surface->kind == MHE_OBSTACLE_TORUS) {
+        torus_shape(surface->size, x, t, b, out);
+    } else {
+        ellipsoid_shape(surface->size, x, t, b, out);
+    }
+}
+
+static void geodesic_rate(const wrap_surface *surface, const double *y, double *rate) {
+    surface_shape shape;
+    surface_shape_at(surface, y, y + 3, NULL, &shape);
+    for (int i = 0; i < 3; i++) {
+        rate[i] = y[3 + i];
+        rate[3 + i] = -shape.bend * shape.normal[i];
+    }
+    rate[6] = y[7];
+    rate[7] = -shape.gauss * y[6];
+    rate[8] = y[9];
+    rate[9] = -shape.gauss * y[8];
+}
+
+/* One step of the midpoint rule in n substeps, without the last smoothing. */
+static void midpoint_step(const wrap_surface *surface, const double *y, const double *first,
+                          double h, int n, double *out) {
+    double last[STATES], rate[STATES], sub = h / n;
+    memcpy(last, y, sizeof last);
+    for (int i = 0; i < STATES; i++) {
+        out[i] = y[i] + sub * first[i];
+    }
+    for (int k = 1; k < n; k++) {
+        geodesic_rate(surface, out, rate);
+        for (int i = 0; i < STATES; i++) {
+            double next = last[i] + 2 * sub * rate[i];
+            last[i] = out[i];
+            out[i] = next;
+        }
+    }
+}
+
+/* Extrapolated step; returns its error in units of what is allowed. */
+static double geodesic_step(const wrap_surface *surface, const double *y, const double *first,
+                            double h, double scale, double *out) {
+    double table[LEVELS][STATES], error = INFINITY;
+    for (int k = 0; k < LEVELS && !(error < 1); k++) {
+        midpoint_step(surface, y, first, h, 2 * (k + 1), out);
+        for (int m = 1; m <= k; m++) { /* table[m - 1]: of the coarser row, then of this one */
+            double ratio = (double)(k + 1) / (double)(k + 1 - m);
+            double factor = 1 / (ratio * ratio - 1);
+            for (int i = 0; i < STATES; i++) {
+                double off = out[i] - table[m - 1][i];
+                table[m - 1][i] = out[i];
+                out[i] += off * factor;
+            }
+        }
+        memcpy(table[k], out, sizeof table[k]);
+        if (k < 2) {
+            continue;
+        }
+        error = 0;
+        for (int i = 0; i < 6; i++) {
+            double off = fabs(out[i] - table[k - 1][i]) / (i < 3 ? scale : 1);
+            error = off > error || isnan(off) ? off : error;
+        }
+        error /= ACCURACY;
+    }
+    return error;
+}
+
+void geodesic_follow(const wrap_surface *surface, const double *x, const double *t, double length,
+                     geodesic_state *end) {
+    double y[STATES] = {x[0], x[1], x[2], t[0], t[1], t[2], 1, 0, 0, 1};
+    double scale = fmax(surface->size[0], surface->size[1]), left = length;
+    for (int step = 0; step < MAX_STEPS && left != 0; step++) {
+        double first[STATES], next[STATES];
+        surface_shape shape;
+        surface_shape_at(surface, y, y + 3, NULL, &shape);
+        geodesic_rate(surface, y, first);
+        double curvature = fmax(fabs(shape.bend), sqrt(fabs(shape.gauss)));
+        double h = left, longest = STEP / curvature;
+        if (!(fabs(h) <= longest)) {
+            h = copysign(longest, left);
+        }
+        for (int k = 0; k < MAX_HALVINGS; k++, h /= 2) {
+            if (geodesic_step(surface, y, first, h, scale, next) < 1) {
+                break;
+            }
+        }
+        memcpy(y, next, sizeof y);
+        left = h == left ? 0 : left - h;
+    }
+    memcpy(end->y, y, sizeof y);
+}
+
+/* ---- strings ---- */
+
+/* What the string misses s by, across and off the surface, and how (turn, arc) change that. */
+typedef struct shot {
+    double miss[2];        /* w . n, w . b, of w = s - its end of the geodesic; m */
+    double by_turn[2], by_arc[2];
+    double ahead;          /* w . t */
+    double spread;         /* S over its value on a flat surface: < 0 beyond a conjugate point */
+} shot;
+
+static void across3(const double *t, const double *n, double *out) {
+    cross3(t, n, out);
+    double norm = sqrt(dot3(out, out));
+    for (int i = 0; i < 3; i++) {
+        out[i] /= norm;
+    }
+}
+
+/* 0: done; the string is written but for what concerns s. */
+static int string_fire(const wrap_surface *surface, const double *p, const double *s,
+                       const string_start *start, double turn, double arc, wrap_string *out,
+                       shot *result) {
+    double a_turn[3], side[3], w[3];
+    surface_shape shape;
+    geodesic_state end;
+    start->contact(start->data, turn, out->a, a_turn);
+    for (int i = 0; i < 3; i++) {
+        out->t[0][i] = out->a[i] - p[i];
+    }
+    double d1 = sqrt(dot3(out->t[0], out->t[0]));
+    if (!(d1 > 0)) {
+        return -1;
+    }
+    for (int i = 0; i < 3; i++) {
+        out->t[0][i] /= d1;
+    }
+    surface_shape_at(surface, out->a, out->t[0], NULL, &shape);
+    memcpy(out->n[0], shape.normal, sizeof out->n[0]);
+    across3(out->t[0], out->n[0], side);
+    double along = dot3(a_turn, out->t[0]), beside = dot3(a_turn, side);
+    geodesic_follow(surface, out->a, out->t[0], arc, &end);
+    memcpy(out->b, end.y, sizeof out->b);
+    memcpy(out->t[1], end.y + 3, sizeof out->t[1]);
+    memcpy(out->field, end.y + 6, sizeof out->field);
+    out->straight[0] = d1;
+    out->arc = arc;
+    surface_shape_at(surface, out->b, out->t[1], NULL, &shape);
+    memcpy(out->n[1], shape.normal, sizeof out->n[1]);
+    across3(out->t[1], out->n[1], side);
+    surface_shape_at(surface, out->b, out->t[1], side, &shape);
+    for (int i = 0; i < 3; i++) {
+        w[i] = s[i] - out->b[i];
+    }
+    double g = dot3(w, out->n[1]), h = dot3(w, side), d2 = dot3(w, out->t[1]);
+    double j = beside * (out->field[0] + out->field[2] / d1);
+    double rate = beside * (out->field[1] + out->field[3] / d1);
+    result->miss[0] = g;
+    result->miss[1] = h;
+    result->by_arc[0] = d2 * shape.bend + h * shape.twist;
+    result->by_arc[1] = -shape.twist * g;
+    result->by_turn[0] = along * result->by_arc[0] + j * (d2 * shape.twist + h * shape.cross_bend);
+    result->by_turn[1] = along * result->by_arc[1] - j - d2 * rate - g * shape.cross_bend * j;
+    result->ahead = d2;
+    result->spread = (j + d2 * rate) / (beside == 0 ? 1 : beside);
+    out->straight[1] = d2;
+    return isfinite(g) && isfinite(h) ? 0 : -1;
+}
+
+int string_shoot(const wrap_surface *surface, const double *p, const double *s,
+                 const string_start *start, double *turn, wrap_string *out) {
+    double scale = fmax(surface->size[0], surface->size[1]), limit = SOLVED * scale;
+    double at = start->turn, arc = start->arc;
+    shot now;
+    if (string_fire(surface, p, s, start, at, arc, out, &now) != 0) {
+        return -1;
+    }
+    double miss = hypot(now.miss[0], now.miss[1]);
+    for (int k = 0; k < MAX_NEWTON; k++) {
+        if (miss < limit) {
+            *turn = at;
+            return now.ahead > 0 && now.spread > 0 && arc > -limit ? 0 : -1;
+        }
+        double det = now.by_turn[0] * now.by_arc[1] - now.by_turn[1] * now.by_arc[0];
+        double step_turn = (now.miss[1] * now.by_arc[0] - now.miss[0] * now.by_arc[1]) / det;
+        double step_arc = (now.miss[0] * now.by_turn[1] - now.miss[1] * now.by_turn[0]) / det;
+        double size = fmax(fabs(step_turn) / MAX_TURN, fabs(step_arc) / scale / MAX_TURN);
+        double share = size > 1 ? 1 / size : 1, before = miss;
+        int better = 0;
+        for (int half = 0; half < 8 && !better; half++, share /= 2) {
+            if (string_fire(surface, p, s, start, at + share * step_turn, arc + share * step_arc,
+                            out, &now) != 0) {
+                continue;
+            }
+            miss = hypot(now.miss[0], now.miss[1]);
+            better = miss < before || share * size > 0.999;
+            if (better) {
+                at += share * step_turn;
+                arc += share * step_arc;
+            }
+        }
+        if (!better) {
+            *turn = at; /* no better in these digits */
+            return before < 1e3 * limit && now.ahead > 0 && now.spread > 0 ? 0 : -1;
+        }
+    }
+    return -1;
+}
