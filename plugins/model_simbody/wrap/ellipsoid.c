@@ -12,10 +12,10 @@
 #include <math.h>
 #include <string.h>
 
-#define FAN 16        /* planes, as half planes about the straight line */
-#define SAMPLES 6     /* of an arc's length */
-#define TRIED 3       /* strings solved exactly at most */
-#define NEAR 0.03     /* of the length: planes that are not worse than that may hold the shortest */
+#define FAN 16    /* planes, as half planes about the straight line */
+#define SAMPLES 6 /* of an arc's length */
+#define TRIED 3   /* strings solved exactly at most */
+#define NEAR 0.03 /* of the length: planes that are not worse than that may hold the shortest */
 #define OUTSIDE 1e-9
 #define HALF_TURN 3.141592653589793
 
@@ -145,9 +145,8 @@ static void fan_string_at(const fan *f, double angle, int axis, fan_string *out)
         d2 += pow(f->size[i] * (b[i] - f->s[i]), 2);
     }
     out->length = sqrt(d1) + sqrt(d2) + out->arc;
-    out->apex = axis < 0 ? 0
-                         : centre[axis] + radius * (cos(middle) * f->u[axis] +
-                                                    sin(middle) * w[axis]);
+    out->apex =
+        axis < 0 ? 0 : centre[axis] + radius * (cos(middle) * f->u[axis] + sin(middle) * w[axis]);
 }
 
 static int solve_from(const wrap_surface *surface, const double *p, const double *s, const fan *f,

@@ -10,14 +10,18 @@
 #include <string.h>
 
 #define STATES 10
-#define LEVELS 8         /* of extrapolation: 2, 4 .. 16 substeps */
-#define ACCURACY 1e-13   /* of a step, relative to the surface's size */
-#define STEP 1.0         /* longest step, as an angle by the curvature where it begins */
+#define LEVELS 8    /* of extrapolation: 2, 4 .. 16 substeps */
+#define FINE 1e-11  /* error of a step less one order, relative to the surface's size */
+#define COARSE 1e-5 /* likewise, while a string is far from its end */
+#define STEP 0.7    /* longest step, as an angle by the curvature where it begins */
 #define MAX_HALVINGS 12
 #define MAX_STEPS 400
 #define MAX_NEWTON 40
-#define MAX_TURN 0.5     /* rad, sizes: longest step of Newton's method */
-#define SOLVED 2e-13     /* miss, relative to the surface's size */
+#define MAX_CUTS 8
+#define NEAR 1e-3    /* miss, relative to the surface's size: from here on, fine steps */
+#define LONGEST 7.0  /* sizes: no string is longer on its surface */
+#define MAX_TURN 0.5 /* rad, sizes: longest step of Newton's method */
+#define SOLVED 2e-13 /* miss, relative to the surface's size */
 
 static void ellipsoid_shape(const double *size, const double *x, const double *t, const double *b,
                             surface_shape *out) {
@@ -104,7 +108,7 @@ static void midpoint_step(const wrap_surface *surface, const double *y, const do
 
 /* Extrapolated step; returns its error in units of what is allowed. */
 static double geodesic_step(const wrap_surface *surface, const double *y, const double *first,
-                            double h, double scale, double *out) {
+                            double h, double scale, double accuracy, double *out) {
     double table[LEVELS][STATES], error = INFINITY;
     for (int k = 0; k < LEVELS && !(error < 1); k++) {
         midpoint_step(surface, y, first, h, 2 * (k + 1), out);
@@ -118,7 +122,7 @@ static double geodesic_step(const wrap_surface *surface, const double *y, const 
             }
         }
         memcpy(table[k], out, sizeof table[k]);
-        if (k < 2) {
+        if (k < 1) {
             continue;
         }
         error = 0;
@@ -126,13 +130,13 @@ static double geodesic_step(const wrap_surface *surface, const double *y, const 
             double off = fabs(out[i] - table[k - 1][i]) / (i < 3 ? scale : 1);
             error = off > error || isnan(off) ? off : error;
         }
-        error /= ACCURACY;
+        error /= accuracy;
     }
     return error;
 }
 
 void geodesic_follow(const wrap_surface *surface, const double *x, const double *t, double length,
-                     geodesic_state *end) {
+                     double accuracy, geodesic_state *end) {
     double y[STATES] = {x[0], x[1], x[2], t[0], t[1], t[2], 1, 0, 0, 1};
     double scale = fmax(surface->size[0], surface->size[1]), left = length;
     for (int step = 0; step < MAX_STEPS && left != 0; step++) {
@@ -146,7 +150,7 @@ void geodesic_follow(const wrap_surface *surface, const double *x, const double 
             h = copysign(longest, left);
         }
         for (int k = 0; k < MAX_HALVINGS; k++, h /= 2) {
-            if (geodesic_step(surface, y, first, h, scale, next) < 1) {
+            if (geodesic_step(surface, y, first, h, scale, accuracy, next) < 1) {
                 break;
             }
         }
@@ -160,10 +164,10 @@ void geodesic_follow(const wrap_surface *surface, const double *x, const double 
 
 /* What the string misses s by, across and off the surface, and how (turn, arc) change that. */
 typedef struct shot {
-    double miss[2];        /* w . n, w . b, of w = s - its end of the geodesic; m */
+    double miss[2]; /* w . n, w . b, of w = s - its end of the geodesic; m */
     double by_turn[2], by_arc[2];
-    double ahead;          /* w . t */
-    double spread;         /* S over its value on a flat surface: < 0 beyond a conjugate point */
+    double ahead;  /* w . t */
+    double spread; /* S over its value on a flat surface: < 0 beyond a conjugate point */
 } shot;
 
 static void across3(const double *t, const double *n, double *out) {
@@ -176,8 +180,8 @@ static void across3(const double *t, const double *n, double *out) {
 
 /* 0: done; the string is written but for what concerns s. */
 static int string_fire(const wrap_surface *surface, const double *p, const double *s,
-                       const string_start *start, double turn, double arc, wrap_string *out,
-                       shot *result) {
+                       const string_start *start, double turn, double arc, double accuracy,
+                       wrap_string *out, shot *result) {
     double a_turn[3], side[3], w[3];
     surface_shape shape;
     geodesic_state end;
@@ -196,7 +200,7 @@ static int string_fire(const wrap_surface *surface, const double *p, const doubl
     memcpy(out->n[0], shape.normal, sizeof out->n[0]);
     across3(out->t[0], out->n[0], side);
     double along = dot3(a_turn, out->t[0]), beside = dot3(a_turn, side);
-    geodesic_follow(surface, out->a, out->t[0], arc, &end);
+    geodesic_follow(surface, out->a, out->t[0], arc, accuracy, &end);
     memcpy(out->b, end.y, sizeof out->b);
     memcpy(out->t[1], end.y + 3, sizeof out->t[1]);
     memcpy(out->field, end.y + 6, sizeof out->field);
@@ -224,41 +228,52 @@ static int string_fire(const wrap_surface *surface, const double *p, const doubl
     return isfinite(g) && isfinite(h) ? 0 : -1;
 }
 
+/* Newton's step for (turn, arc), shortened to what its linear model may be trusted with. */
+static double newton_step(const shot *now, double scale, double *step) {
+    double det = now->by_turn[0] * now->by_arc[1] - now->by_turn[1] * now->by_arc[0];
+    step[0] = (now->miss[1] * now->by_arc[0] - now->miss[0] * now->by_arc[1]) / det;
+    step[1] = (now->miss[0] * now->by_turn[1] - now->miss[1] * now->by_turn[0]) / det;
+    double size = fmax(fabs(step[0]), fabs(step[1]) / scale) / MAX_TURN;
+    return size > 1 ? 1 / size : 1;
+}
+
 int string_shoot(const wrap_surface *surface, const double *p, const double *s,
                  const string_start *start, double *turn, wrap_string *out) {
     double scale = fmax(surface->size[0], surface->size[1]), limit = SOLVED * scale;
-    double at = start->turn, arc = start->arc;
+    double arc = start->arc, accuracy = COARSE, step[2];
     shot now;
-    if (string_fire(surface, p, s, start, at, arc, out, &now) != 0) {
+    *turn = start->turn;
+    if (string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now) != 0) {
         return -1;
     }
     double miss = hypot(now.miss[0], now.miss[1]);
     for (int k = 0; k < MAX_NEWTON; k++) {
-        if (miss < limit) {
-            *turn = at;
-            return now.ahead > 0 && now.spread > 0 && arc > -limit ? 0 : -1;
+        if (accuracy > FINE && miss < NEAR * scale) {
+            accuracy = FINE;
+            (void)string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now);
+            miss = hypot(now.miss[0], now.miss[1]);
         }
-        double det = now.by_turn[0] * now.by_arc[1] - now.by_turn[1] * now.by_arc[0];
-        double step_turn = (now.miss[1] * now.by_arc[0] - now.miss[0] * now.by_arc[1]) / det;
-        double step_arc = (now.miss[0] * now.by_turn[1] - now.miss[1] * now.by_turn[0]) / det;
-        double size = fmax(fabs(step_turn) / MAX_TURN, fabs(step_arc) / scale / MAX_TURN);
-        double share = size > 1 ? 1 / size : 1, before = miss;
-        int better = 0;
-        for (int half = 0; half < 8 && !better; half++, share /= 2) {
-            if (string_fire(surface, p, s, start, at + share * step_turn, arc + share * step_arc,
-                            out, &now) != 0) {
+        int done = accuracy == FINE && miss < limit, better = done;
+        double share = newton_step(&now, scale, step), before = miss;
+        int whole = share == 1;
+        for (int half = 0; half < MAX_CUTS && !better; half++, share /= 2) {
+            if (string_fire(surface, p, s, start, *turn + share * step[0], arc + share * step[1],
+                            accuracy, out, &now) != 0) {
                 continue;
             }
             miss = hypot(now.miss[0], now.miss[1]);
-            better = miss < before || share * size > 0.999;
+            better = miss < before || (half == 0 && !whole);
             if (better) {
-                at += share * step_turn;
-                arc += share * step_arc;
+                *turn += share * step[0];
+                arc += share * step[1];
             }
         }
-        if (!better) {
-            *turn = at; /* no better in these digits */
-            return before < 1e3 * limit && now.ahead > 0 && now.spread > 0 ? 0 : -1;
+        if (done || !better) { /* not better: the digits end here, or no solution */
+            int solved = done || (accuracy == FINE && before < 1e3 * limit);
+            return solved && now.ahead > 0 && now.spread > 0 && arc > -limit &&
+                           arc < LONGEST * scale
+                       ? 0
+                       : -1;
         }
     }
     return -1;

@@ -8,7 +8,7 @@
 /* Local shape at a point on (or, by rounding, near) the surface. */
 typedef struct surface_shape {
     double normal[3];
-    double gauss;                  /* Gauss curvature */
+    double gauss;                   /* Gauss curvature */
     double bend, twist, cross_bend; /* II(t, t), II(t, b), II(b, b); > 0: the surface falls away */
 } surface_shape;
 
@@ -21,9 +21,10 @@ typedef struct geodesic_state {
     double y[10];
 } geodesic_state;
 
-/* Follows the geodesic by `length`, from x on the surface along the unit tangent t. */
+/* Follows the geodesic by `length`, from x on the surface along the unit tangent t; `accuracy`: of
+ * a step, relative to the surface's size. */
 void geodesic_follow(const wrap_surface *surface, const double *x, const double *t, double length,
-                     geodesic_state *end);
+                     double accuracy, geodesic_state *end);
 
 /* A string from p that comes onto the surface at contact(turn): the points where lines from p are
  * tangent are a curve. */

@@ -9,7 +9,7 @@
 
 #define RETRIES 9
 #define RETRY_TURN 0.3 /* rad */
-#define AROUND 16 /* places looked at for where to begin */
+#define AROUND 16      /* places looked at for where to begin */
 #define FULL_TURN 6.283185307179586
 
 /* Points where lines from p are tangent to the tube, by the angle about the axis. */
@@ -83,7 +83,8 @@ static double meridian_length(const meridian *m, double turn, double *arc) {
     v[0] = atan2(a[2], hypot(a[0], a[1]) - m->from.ring);
     v[1] = atan2(b[2], hypot(b[0], b[1]) - m->from.ring);
     double angle = m->growing * (v[1] - v[0]);
-    angle -= FULL_TURN * floor(angle / FULL_TURN + 1e-9);
+    /* off a meridian that the string does not touch, the angle is less than none */
+    angle -= FULL_TURN * floor(angle / FULL_TURN + 0.25);
     for (int end = 0; end < 2; end++) {
         const double *x = end ? b : a, *other = end ? m->to.p : m->from.p;
         double w[3] = {x[0] - other[0], x[1] - other[1], x[2] - other[2]};
@@ -140,15 +141,20 @@ int wrap_torus(const wrap_surface *surface, const double *p, const double *s, wr
                   .to = {.tube = tube, .ring = ring, .p = {s[0], s[1], s[2]}, .sense = growing},
                   .growing = growing};
     string_start start = {.contact = curve_contact, .data = &m.from};
-    double turn, nearest = contact_guess(surface, &m, &start.arc);
-    for (int k = 0; k < RETRIES; k++) { /* outwards from there, alternating */
+    wrap_string string;
+    double turn, nearest = contact_guess(surface, &m, &start.arc), shortest = INFINITY;
+    start.turn = nearest;
+    if (string_shoot(surface, p, s, &start, &turn, out) == 0) {
+        return needs;
+    }
+    for (int k = 1; k < RETRIES; k++) { /* outwards from there, alternating */
         start.turn = nearest + (k % 2 ? 1 : -1) * ((k + 1) / 2) * RETRY_TURN;
-        if (k > 0) {
-            (void)meridian_length(&m, start.turn, &start.arc);
-        }
-        if (string_shoot(surface, p, s, &start, &turn, out) == 0) {
-            return needs;
+        (void)meridian_length(&m, start.turn, &start.arc);
+        if (string_shoot(surface, p, s, &start, &turn, &string) == 0 &&
+            wrap_length(&string) < shortest) {
+            shortest = wrap_length(&string);
+            *out = string;
         }
     }
-    return WRAP_UNSOLVED;
+    return isfinite(shortest) ? needs : WRAP_UNSOLVED;
 }

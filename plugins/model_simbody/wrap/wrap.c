@@ -30,10 +30,10 @@ double wrap_length(const wrap_string *string) {
 void wrap_curvature(const wrap_string *w, double *pp, double *ps, double *ss) {
     double d1 = w->straight[0], d2 = w->straight[1], across[2][3];
     const double *f = w->field;
-    double c = f[0] + d2 * f[1];            /* C */
-    double j = d1 * f[0] + f[2];            /* of (0, 1) at p: at b */
-    double rate = d1 * f[1] + f[3];         /* S' */
-    double s = j + d2 * rate;               /* S */
+    double c = f[0] + d2 * f[1];    /* C */
+    double j = d1 * f[0] + f[2];    /* of (0, 1) at p: at b */
+    double rate = d1 * f[1] + f[3]; /* S' */
+    double s = j + d2 * rate;       /* S */
     for (int k = 0; k < 2; k++) {
         cross3(w->t[k], w->n[k], across[k]);
     }
@@ -55,8 +55,8 @@ typedef struct circle_string {
     double straight[2];
 } circle_string;
 
-static void circle_tangents(double radius, const double *distance, const double *angle, double sense,
-                            circle_string *out) {
+static void circle_tangents(double radius, const double *distance, const double *angle,
+                            double sense, circle_string *out) {
     double open[2];
     for (int k = 0; k < 2; k++) {
         out->straight[k] = sqrt((distance[k] - radius) * (distance[k] + radius));
@@ -67,7 +67,9 @@ static void circle_tangents(double radius, const double *distance, const double 
     out->turn = turn - FULL_TURN * floor(turn / FULL_TURN + TOUCHING);
 }
 
-static int sign_of(double x) { return x < 0 ? -1 : 1; }
+static int sign_of(double x) {
+    return x < 0 ? -1 : 1;
+}
 
 /* ---- sphere ---- */
 

@@ -31,10 +31,10 @@ typedef struct wrap_string {
     double field[4];         /* j, j' at b of (1, 0) at a; of (0, 1) at a */
 } wrap_string;
 
-#define WRAP_INSIDE (-1)  /* an end is inside: no wrap */
-#define WRAP_NONE 0       /* the straight line is free */
-#define WRAP_POSSIBLE 1   /* wraps though the straight line does not cross the obstacle */
-#define WRAP_CROSSED 2    /* wraps, since the straight line crosses it */
+#define WRAP_INSIDE (-1)   /* an end is inside: no wrap */
+#define WRAP_NONE 0        /* the straight line is free */
+#define WRAP_POSSIBLE 1    /* wraps though the straight line does not cross the obstacle */
+#define WRAP_CROSSED 2     /* wraps, since the straight line crosses it */
 #define WRAP_UNSOLVED (-2) /* no geodesic was found: no wrap */
 
 /* The string from p to s, if it wraps (> 0). Depends on its arguments alone. [any] */
@@ -48,8 +48,7 @@ void wrap_curvature(const wrap_string *string, double *pp, double *ps, double *s
 /* Of the kinds; as wrap_solve(). */
 int wrap_sphere(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
 int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
-int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
-                   wrap_string *out);
+int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
 int wrap_torus(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
 
 #endif
