@@ -13,7 +13,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 # Two sets: plugins and applications need the headers, libmhe.so and the conformance program, and none of the libraries
 # behind the core; who links the test kit statically needs those too.
 install(TARGETS mhe_plugin mhe_library EXPORT mhePluginTargets LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
-install(TARGETS mhe_core EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(TARGETS mhe_base mhe_core EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 if(TARGET mhe_testkit)
     install(TARGETS mhe_testkit EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 endif()

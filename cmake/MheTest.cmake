@@ -27,7 +27,7 @@ function(mhe_test name)
     endif()
     cmake_parse_arguments(arg "" "LABEL" "SOURCES;LIBRARIES" ${ARGN})
     add_executable(test_${name} ${arg_SOURCES})
-    target_link_libraries(test_${name} PRIVATE mhe_test_support mhe_core mhe_flags ${arg_LIBRARIES})
+    target_link_libraries(test_${name} PRIVATE ${arg_LIBRARIES} mhe_test_support mhe_core mhe_flags)
     target_compile_definitions(test_${name} PRIVATE
         MHE_TEST_SOURCE_DIR="${CMAKE_SOURCE_DIR}" MHE_TEST_BINARY_DIR="${CMAKE_BINARY_DIR}"
         MHE_TEST_PLUGIN_DIR="${MHE_PLUGIN_BUILD_DIR}")

@@ -2,10 +2,9 @@
 /* figure.c: the script's file, and the run of gnuplot. */
 #include "figure.h"
 
-#include "io/outbox.h"
-
 #include <errno.h>
 #include <fcntl.h>
+#include <mhe/outbox.h>
 #include <spawn.h>
 #include <string.h>
 #include <sys/wait.h>
@@ -13,15 +12,15 @@
 
 extern char **environ;
 
-static mhe_status write_script(const figure *f, mhi_outbox *outbox, mhe_error *err) {
+static mhe_status write_script(const figure *f, mhe_outbox *outbox, mhe_error *err) {
     mhi_text script = {0}, file = {0};
     figure_script(f, &script);
     mhi_text_add(&file, "%s.gp", f->name);
     mhe_status status = script.failed || file.failed
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_outbox_text(outbox, file.data, script.data, err);
+                            : mhe_outbox_text(outbox, file.data, script.data, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
     mhi_text_free(&script);
     mhi_text_free(&file);
@@ -80,25 +79,25 @@ static void remove_picture(const char *dir, const char *name) {
 
 mhe_status figure_draw(const figure *f, const char *dir, mhe_error *err) {
     char name[64];
-    mhi_outbox *outbox = NULL;
-    mhi_outbox_file *picture = NULL;
+    mhe_outbox *outbox = NULL;
+    FILE *picture = NULL;
     (void)snprintf(name, sizeof name, "%s.svg", f->name);
-    mhe_status status = mhi_outbox_open(dir, &outbox, err);
+    mhe_status status = mhe_outbox_open(dir, &outbox, err);
     if (status == MHE_OK) {
         status = write_script(f, outbox, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_add(outbox, name, &picture, err);
+        status = mhe_outbox_stream(outbox, name, &picture, err);
     }
     if (status == MHE_OK) {
-        status = run_gnuplot(f, dir, fileno(picture->stream), err);
+        status = run_gnuplot(f, dir, fileno(picture), err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
     if (status != MHE_OK) {
         remove_picture(dir, name);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     return status;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* figure_script.c: the figure in gnuplot's language. */
+#include "base/number.h"
 #include "figure.h"
-#include "io/number.h"
 
 #include <math.h>
 #include <string.h>

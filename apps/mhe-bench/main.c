@@ -2,9 +2,9 @@
 /* mhe-bench: times every layer of the estimator and whole runs, variant against variant. */
 #include "arguments.h"
 #include "console.h"
-#include "io/sink.h"
 #include "picture.h"
 #include "report.h"
+#include <mhe/outbox.h>
 
 #include <mhe/version.h>
 #include <stdlib.h>
@@ -23,21 +23,21 @@ static mhe_status write_files(const arguments *a, const bench *b, const mhe_host
         return mhe_fail(err, MHE_E_ARGUMENT, "the path of the output folder is too long");
     }
     mhi_text text = {0};
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhe_status status = report_json(b, a->config, &text, err);
     if (status == MHE_OK && text.failed) {
         status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_open(folder, &outbox, err);
+        status = mhe_outbox_open(folder, &outbox, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, "bench.json", text.data, err);
+        status = mhe_outbox_text(outbox, "bench.json", text.data, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     mhi_text_free(&text);
     mhe_error why = {0};
     if (status == MHE_OK && run->output.picture && picture_rate(b, folder, &why) != MHE_OK) {

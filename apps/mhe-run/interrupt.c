@@ -15,14 +15,14 @@ static const int signals[] = {SIGINT, SIGTERM, SIGALRM};
 
 static atomic_int asked, asked_at_last;
 static atomic_llong heard; /* the last that was no echo, ns of CLOCK_MONOTONIC */
-static const mhi_outbox *outbox;
+static const mhe_outbox *outbox;
 static struct sigaction before[N_SIGNALS];
 
 /* Only what a signal handler may call. */
 static void leave(void) {
     static const char text[] = "mhe-run: interrupted in a solve that does not end; nothing is "
                                "written\n";
-    mhi_outbox_abandon(outbox);
+    mhe_outbox_abandon(outbox);
     (void)!write(STDERR_FILENO, text, sizeof text - 1);
     _exit(1);
 }
@@ -75,7 +75,7 @@ static void handle(void (*handler)(int), struct sigaction *old) {
     }
 }
 
-void interrupt_begin(const mhi_outbox *files) {
+void interrupt_begin(const mhe_outbox *files) {
     outbox = files;
     handle(on_signal, before);
 }

@@ -8,14 +8,14 @@
 #ifndef INTERRUPT_H
 #define INTERRUPT_H
 
-#include "io/sink.h"
+#include <mhe/outbox.h>
 
 #include <stdatomic.h>
 
 #define INTERRUPT_GRACE 2 /* s */
 
 /* From here on signals ask. `outbox` is lent, its files do not change until interrupt_settle. */
-void interrupt_begin(const mhi_outbox *outbox);
+void interrupt_begin(const mhe_outbox *outbox);
 /* Not 0: asked to end. */
 const atomic_int *interrupt_asked(void);
 /* The frames are done, the files are being written: this is brief and is not broken off, but by a

@@ -2,8 +2,8 @@
 #include "matlab.h"
 
 #include "base/arena.h"
-#include "io/outbox.h"
 
+#include <errno.h>
 #include <matio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +18,6 @@ struct matlab_table {
 };
 
 struct matlab {
-    mhi_outbox_file *file;
     matlab_table *first, **last;
     mhi_arena arena;
 };
@@ -31,8 +30,8 @@ static void free_matlab(matlab *m) {
     free(m);
 }
 
-static void release(mhi_outbox_file *file) {
-    free_matlab(file->owner);
+static void release(void *data) {
+    free_matlab(data);
 }
 
 /* n columns from `first` on, column by column as MATLAB has them. */
@@ -90,33 +89,31 @@ static int write_table(mat_t *mat, const matlab_table *t) {
     return failed;
 }
 
-/* By the name of the open file: the outbox syncs and renames what is there. */
-static mhe_status complete(mhi_outbox_file *file, mhe_error *err) {
-    const matlab *m = file->owner;
-    mat_t *mat = Mat_CreateVer(file->open_path, NULL, MAT_FT_MAT5);
+static mhe_status write_all(void *data, const char *path, mhe_error *err) {
+    const matlab *m = data;
+    mat_t *mat = Mat_CreateVer(path, NULL, MAT_FT_MAT5);
     int failed = mat == NULL;
     for (const matlab_table *t = m->first; t != NULL && !failed; t = t->next) {
         failed = write_table(mat, t);
     }
     failed = (mat != NULL && Mat_Close(mat) != 0) || failed;
-    return failed ? mhi_outbox_write_failed(file, err) : MHE_OK;
+    return failed ? mhe_fail(err, MHE_E_IO, "cannot be written: %s",
+                             strerror(errno != 0 ? errno : EIO))
+                  : MHE_OK;
 }
 
-mhe_status matlab_open(mhi_outbox *outbox, const char *name, matlab **file, mhe_error *err) {
+mhe_status matlab_open(mhe_outbox *outbox, const char *name, matlab **file, mhe_error *err) {
     *file = NULL;
     matlab *m = calloc(1, sizeof *m);
     if (m == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
     }
-    mhe_status status = mhi_outbox_add(outbox, name, &m->file, err);
+    mhe_status status = mhe_outbox_later(outbox, name, write_all, release, m, err);
     if (status != MHE_OK) {
         free_matlab(m);
         return status;
     }
     m->last = &m->first;
-    m->file->owner = m;
-    m->file->complete = complete;
-    m->file->release = release;
     *file = m;
     return MHE_OK;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "report.h"
 
-#include "io/sink.h"
 #include "io/table.h"
+#include <mhe/outbox.h>
 
 #include <errno.h>
 #include <math.h>
@@ -141,7 +141,7 @@ mhe_status report_write(const char *dir, const char *name, const char *summary, 
                                         "emg.sto", "quality.sto"};
     mhi_table *tables[5] = {NULL};
     mhi_text page = {0};
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhe_status status = MHE_OK;
     for (int i = 0; i < 5 && status == MHE_OK; i++) {
         char path[4096];
@@ -157,15 +157,15 @@ mhe_status report_write(const char *dir, const char *name, const char *summary, 
     if (status == MHE_OK) {
         compose(&page, name, summary, tables);
         status = page.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                             : mhi_outbox_open(dir, &outbox, err);
+                             : mhe_outbox_open(dir, &outbox, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, "report.html", page.data, err);
+        status = mhe_outbox_text(outbox, "report.html", page.data, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     mhi_text_free(&page);
     for (int i = 0; i < 5; i++) {
         mhi_table_free(tables[i]);

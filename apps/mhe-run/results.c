@@ -19,7 +19,7 @@ const int32_t results_n_names = (int32_t)(sizeof results_names / sizeof results_
 
 /* One table in all its formats. */
 typedef struct series {
-    mhi_sink *sinks[MOST_SINKS];
+    mhe_sink *sinks[MOST_SINKS];
     int32_t n_sinks;
     matlab_table *table; /* NULL: none */
 } series;
@@ -51,7 +51,7 @@ static void add_names(names *to, const char *prefix, const char *const *list, in
 }
 
 /* Everything but the .sto or .trc. */
-static mhe_status open_others(results *r, mhi_outbox *outbox, const char *name, const names *labels,
+static mhe_status open_others(results *r, mhe_outbox *outbox, const char *name, const names *labels,
                               series *s, mhe_error *err) {
     mhe_status status = MHE_OK;
     if (labels->failed) {
@@ -60,7 +60,7 @@ static mhe_status open_others(results *r, mhi_outbox *outbox, const char *name, 
     if (r->csv) {
         char file[64];
         (void)snprintf(file, sizeof file, "%s.csv", name);
-        status = mhi_sink_csv(outbox, file, labels->list, labels->n, &s->sinks[s->n_sinks], err);
+        status = mhe_sink_csv(outbox, file, labels->list, labels->n, &s->sinks[s->n_sinks], err);
         s->n_sinks += status == MHE_OK;
     }
     if (status == MHE_OK && r->matlab != NULL) {
@@ -69,18 +69,18 @@ static mhe_status open_others(results *r, mhi_outbox *outbox, const char *name, 
     return status;
 }
 
-static mhe_status open_series(results *r, mhi_outbox *outbox, const char *name, const char *title,
+static mhe_status open_series(results *r, mhe_outbox *outbox, const char *name, const char *title,
                               const names *labels, series *s, mhe_error *err) {
     char file[64];
     (void)snprintf(file, sizeof file, "%s.sto", name);
     mhe_status status = labels->failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                       : mhi_sink_sto(outbox, file, title, labels->list, labels->n,
+                                       : mhe_sink_sto(outbox, file, title, labels->list, labels->n,
                                                       &s->sinks[0], err);
     s->n_sinks = status == MHE_OK;
     return status == MHE_OK ? open_others(r, outbox, name, labels, s, err) : status;
 }
 
-static mhe_status open_states(results *r, mhi_outbox *outbox, names *labels, mhe_error *err) {
+static mhe_status open_states(results *r, mhe_outbox *outbox, names *labels, mhe_error *err) {
     const mhe_estimator_info *f = &r->info;
     add_names(labels, "q_", f->coordinate_names, f->n_q, "");
     add_names(labels, "qdot_", f->coordinate_names, f->n_q, "");
@@ -94,14 +94,14 @@ static mhe_status open_states(results *r, mhi_outbox *outbox, names *labels, mhe
     add_names(labels, "", f->coordinate_names, f->n_q, "");
     add_names(labels, "", f->muscle_names, f->n_muscles, ".activation");
     if (status == MHE_OK && !labels->failed) { /* what the OpenSim GUI shows on the model */
-        status = mhi_sink_sto(outbox, "motion.sto", "motion", labels->list, labels->n,
+        status = mhe_sink_sto(outbox, "motion.sto", "motion", labels->list, labels->n,
                               &r->motion.sinks[0], err);
         r->motion.n_sinks = status == MHE_OK;
     }
     return status;
 }
 
-static mhe_status open_markers(results *r, mhi_outbox *outbox, const mhi_recording *recording,
+static mhe_status open_markers(results *r, mhe_outbox *outbox, const mhi_recording *recording,
                                names *labels, mhe_error *err) {
     static const char *const axes[] = {"_x", "_y", "_z"};
     const mhe_estimator_info *f = &r->info;
@@ -109,14 +109,14 @@ static mhe_status open_markers(results *r, mhi_outbox *outbox, const mhi_recordi
     for (int32_t i = 0; i < 3 * f->n_markers; i++) {
         add_names(labels, "", &f->marker_names[i / 3], 1, axes[i % 3]);
     }
-    mhe_status status = mhi_sink_trc(outbox, "markers.trc", f->marker_names, f->n_markers,
+    mhe_status status = mhe_sink_trc(outbox, "markers.trc", f->marker_names, f->n_markers,
                                      recording->rate / f->ratio, recording->unit,
                                      recording->unit_name, &r->markers.sinks[0], err);
     r->markers.n_sinks = status == MHE_OK;
     return status == MHE_OK ? open_others(r, outbox, "markers", labels, &r->markers, err) : status;
 }
 
-static mhe_status open_all(results *r, mhi_outbox *outbox, const mhi_recording *recording,
+static mhe_status open_all(results *r, mhe_outbox *outbox, const mhi_recording *recording,
                            const char **room, mhe_error *err) {
     static const char *quality[] = {"status",   "iterations", "kkt_residual",
                                     "solve_ms", "marker_rms", "emg_rms"};
@@ -165,7 +165,7 @@ static int32_t is_among(const mhe_text_list *list, const char *name) {
     return 0;
 }
 
-mhe_status results_open(mhi_outbox *outbox, const mhe_estimator_info *info,
+mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
                         const mhi_recording *recording, const mhe_text_list *formats,
                         results **result, mhe_error *err) {
     *result = NULL;
@@ -212,7 +212,7 @@ static int32_t put(results *r, int32_t at, const double *values, int32_t n) {
 static mhe_status write_row(const series *s, double time, const double *values, mhe_error *err) {
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < s->n_sinks && status == MHE_OK; i++) {
-        status = mhi_sink_row(s->sinks[i], time, values, err);
+        status = mhe_sink_row(s->sinks[i], time, values, err);
     }
     return status == MHE_OK && s->table != NULL ? matlab_row(s->table, time, values, err) : status;
 }

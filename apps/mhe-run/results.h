@@ -4,7 +4,7 @@
 #define RESULTS_H
 
 #include "estimator/recording.h"
-#include "io/sink.h"
+#include <mhe/outbox.h>
 
 #include <mhe/estimator.h>
 
@@ -18,7 +18,7 @@ extern const int32_t results_n_names;
  * motion.sto in the outbox; with "csv" among the formats the same as .csv, with "mat" in
  * results.mat. Markers there are in m.
  */
-mhe_status results_open(mhi_outbox *outbox, const mhe_estimator_info *info,
+mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
                         const mhi_recording *recording, const mhe_text_list *formats,
                         results **result, mhe_error *err);
 /* `distance` [n_markers] m of measured and estimated markers, `emg` [n_muscles] that was tracked.

@@ -10,6 +10,7 @@
 #include "results.h"
 #include "summary.h"
 
+#include <mhe/library.h>
 #include <string.h>
 
 typedef struct tracking {
@@ -18,7 +19,7 @@ typedef struct tracking {
     mhi_recording *recording;
     mhi_errors *errors;
     diagnosis *diagnosis;
-    mhi_outbox *outbox;
+    mhe_outbox *outbox;
     results *results;
     summary summary;
     live live;
@@ -43,28 +44,29 @@ static mhe_status claim_folder(tracking *t, mhe_error *err) {
     const mhi_data_section *d = &run->data;
     const char *const inputs[] = {run->path, run->model_file.file, d->markers,       d->emg,
                                   d->angles, d->reference,         run->emg.mvc_file};
-    mhe_status status = mhi_outbox_open(t->setup->out, &t->outbox, err);
+    mhe_status status = mhe_outbox_open(t->setup->out, &t->outbox, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_claim(t->outbox, results_names, results_n_names, err);
+        status = mhe_outbox_claim(t->outbox, results_names, results_n_names, err);
     }
     for (size_t i = 0; i < sizeof inputs / sizeof inputs[0] && status == MHE_OK; i++) {
-        status = mhi_outbox_spare(t->outbox, inputs[i], err);
+        status = mhe_outbox_spare(t->outbox, inputs[i], err);
     }
     return status;
 }
 
 /* What of an earlier run lies among, or in the place of, this one's results. */
 static void tell_stale(const tracking *t) {
-    mhi_text names = {0}, line = {0};
-    if (mhi_outbox_stale(t->outbox, &names) > 0 && !names.failed) {
-        mhi_text_add(&line, "%s: of an earlier run, not of this one: %s", t->setup->out,
-                     names.data);
+    char *names = NULL;
+    int32_t n = 0;
+    mhi_text line = {0};
+    if (mhe_outbox_stale(t->outbox, &names, &n, NULL) == MHE_OK && n > 0) {
+        mhi_text_add(&line, "%s: of an earlier run, not of this one: %s", t->setup->out, names);
     }
     if (line.data != NULL && !line.failed) {
         t->setup->host->log(t->setup->host, MHE_LOG_WARNING, line.data);
     }
-    mhi_text_free(&names);
     mhi_text_free(&line);
+    mhe_free(names);
 }
 
 static mhe_status open_all(tracking *t, mhe_error *err) {
@@ -174,14 +176,14 @@ static mhe_status write_texts(tracking *t, mhe_error *err) {
     mhe_estimator_describe(t->estimator, &t->summary.info); /* the interval is known now */
     mhi_run_write(run, &text);
     mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                    : mhi_outbox_text(t->outbox, "config.yaml", text.data, err);
+                                    : mhe_outbox_text(t->outbox, "config.yaml", text.data, err);
     mhi_text_free(&text);
     if (status == MHE_OK) {
         status = summary_json(&t->summary, run, &text, err);
     }
     if (status == MHE_OK) {
         status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                             : mhi_outbox_text(t->outbox, "summary.json", text.data, err);
+                             : mhe_outbox_text(t->outbox, "summary.json", text.data, err);
     }
     mhi_text_free(&text);
     return status;
@@ -225,7 +227,7 @@ static mhe_status finish(tracking *t, mhe_error *err) {
     }
     mhe_status status = write_texts(t, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(t->outbox, err);
+        status = mhe_outbox_commit(t->outbox, err);
     }
     interrupt_end();
     if (status != MHE_OK) {
@@ -268,7 +270,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
         tell_stale(&t);
     }
     results_close(t.results);
-    mhi_outbox_close(t.outbox);
+    mhe_outbox_close(t.outbox);
     mhi_errors_free(t.errors);
     diagnosis_free(t.diagnosis);
     mhi_recording_free(t.recording);

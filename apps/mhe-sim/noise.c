@@ -5,7 +5,7 @@
 #include "estimator/create.h"
 #include "io/c3d_write.h"
 #include "io/model_file.h"
-#include "io/sink.h"
+#include <mhe/outbox.h>
 
 #include <math.h>
 
@@ -15,7 +15,7 @@ typedef struct recorder {
     mhe_description *model;
     mhi_recording *reference;
     mhi_record markers, emg, raw_emg; /* the last one may be none */
-    mhi_outbox *outbox;
+    mhe_outbox *outbox;
     mhi_arena arena;
 } recorder;
 
@@ -37,10 +37,10 @@ static mhe_status record(recorder *r, mhe_error *err) {
                : status;
 }
 
-static mhe_status write_rows(const mhi_record *record, mhi_sink *sink, mhe_error *err) {
+static mhe_status write_rows(const mhi_record *record, mhe_sink *sink, mhe_error *err) {
     mhe_status status = MHE_OK;
     for (int32_t k = 0; k < record->n_samples && status == MHE_OK; k++) {
-        status = mhi_sink_row(sink, record->time[k],
+        status = mhe_sink_row(sink, record->time[k],
                               record->values + (ptrdiff_t)k * record->n_channels, err);
     }
     return status;
@@ -60,19 +60,19 @@ static const char **marker_names(recorder *r, mhe_error *err) {
 
 static mhe_status write_markers(recorder *r, mhe_error *err) {
     const mhe_description *d = r->model;
-    mhi_sink *sink = NULL;
+    mhe_sink *sink = NULL;
     const char **names = marker_names(r, err);
     if (names == NULL) {
         return MHE_E_MEMORY;
     }
-    mhe_status status = mhi_sink_trc(r->outbox, "markers.trc", names, d->n_markers, r->markers.rate,
+    mhe_status status = mhe_sink_trc(r->outbox, "markers.trc", names, d->n_markers, r->markers.rate,
                                      1e-3, "mm", &sink, err);
     return status == MHE_OK ? write_rows(&r->markers, sink, err) : status;
 }
 
 static mhe_status write_emg(recorder *r, mhe_error *err) {
     const mhe_description *d = r->model;
-    mhi_sink *sink = NULL;
+    mhe_sink *sink = NULL;
     const char **names = MHI_TAKE(&r->arena, const char *, d->n_muscles);
     if (names == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
@@ -81,7 +81,7 @@ static mhe_status write_emg(recorder *r, mhe_error *err) {
         names[i] = d->muscles[i].name;
     }
     mhe_status status =
-        mhi_sink_sto(r->outbox, "emg.sto", "EMG, normalised", names, d->n_muscles, &sink, err);
+        mhe_sink_sto(r->outbox, "emg.sto", "EMG, normalised", names, d->n_muscles, &sink, err);
     return status == MHE_OK ? write_rows(&r->emg, sink, err) : status;
 }
 
@@ -116,7 +116,7 @@ static mhe_status write_config(recorder *r, mhe_error *err) {
     mhi_text text = {0};
     mhi_noise_config_write(r->config, &text);
     mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                    : mhi_outbox_text(r->outbox, "noise.yaml", text.data, err);
+                                    : mhe_outbox_text(r->outbox, "noise.yaml", text.data, err);
     mhi_text_free(&text);
     return status;
 }
@@ -125,14 +125,14 @@ static mhe_status write_config(recorder *r, mhe_error *err) {
 static mhe_status claim_folder(recorder *r, const char *out, mhe_error *err) {
     static const char *const names[] = {"markers.trc", "emg.sto",  "recording.c3d",
                                         "noise.yaml",  "noise.gp", "noise.svg"};
-    mhe_status status = mhi_outbox_open(out, &r->outbox, err);
+    mhe_status status = mhe_outbox_open(out, &r->outbox, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_claim(r->outbox, names, (int32_t)(sizeof names / sizeof names[0]), err);
+        status = mhe_outbox_claim(r->outbox, names, (int32_t)(sizeof names / sizeof names[0]), err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_spare(r->outbox, r->config->run->path, err);
+        status = mhe_outbox_spare(r->outbox, r->config->run->path, err);
     }
-    return status == MHE_OK ? mhi_outbox_spare(r->outbox, r->config->reference, err) : status;
+    return status == MHE_OK ? mhe_outbox_spare(r->outbox, r->config->reference, err) : status;
 }
 
 /* A recording without its picture is complete. */
@@ -164,12 +164,12 @@ mhe_status noise_record(const mhi_noise_config *config, const mhe_host *host, co
         status = write_config(&r, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(r.outbox, err);
+        status = mhe_outbox_commit(r.outbox, err);
     }
     if (status == MHE_OK) {
         draw(&r, out);
     }
-    mhi_outbox_close(r.outbox);
+    mhe_outbox_close(r.outbox);
     mhi_record_free(&r.markers);
     mhi_record_free(&r.emg);
     mhi_record_free(&r.raw_emg);

@@ -82,7 +82,7 @@ static void compare(tracking *w, ptrdiff_t k) {
     }
 }
 
-static mhe_status move(tracking *w, mhi_sink *forces, mhe_error *err) {
+static mhe_status move(tracking *w, mhe_sink *forces, mhe_error *err) {
     simulation *s = w->s;
     const mhi_trajectory *t = w->t;
     mhe_status status = MHE_OK;
@@ -93,7 +93,7 @@ static mhe_status move(tracking *w, mhi_sink *forces, mhe_error *err) {
         status = simulation_write(s, time, err);
         if (status == MHE_OK) {
             compare(w, k);
-            status = mhi_sink_row(forces, time, s->row + 2 * s->n_q + 2 * s->n_m, err);
+            status = mhe_sink_row(forces, time, s->row + 2 * s->n_q + 2 * s->n_m, err);
         }
         if (status == MHE_OK && k < t->n) {
             status = simulation_step(s, time, err);
@@ -106,14 +106,14 @@ mhe_status reference_track(simulation *s, const mhi_trajectory *solution, int32_
                            double lower, double upper, track_report *report, mhe_error *err) {
     tracking w = {
         .s = s, .t = solution, .lower = lower, .upper = upper, .first = first, .report = report};
-    mhi_sink *forces = NULL;
+    mhe_sink *forces = NULL;
     *report = (track_report){0};
     mhe_status status = take(&w, err);
     if (status == MHE_OK) {
         status = find_gains(&w, err);
     }
     if (status == MHE_OK) {
-        status = mhi_sink_sto(s->outbox, "forces.sto", "muscle forces, N", s->muscles, s->n_m,
+        status = mhe_sink_sto(s->outbox, "forces.sto", "muscle forces, N", s->muscles, s->n_m,
                               &forces, err);
     }
     if (status == MHE_OK) {

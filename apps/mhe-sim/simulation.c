@@ -91,24 +91,24 @@ mhe_status simulation_files(simulation *s, const char *folder, const char *input
         markers[i] = d->markers[i].name;
     }
     static const char *const names[] = {"reference.sto", "markers.trc", "emg.sto", "forces.sto"};
-    mhe_status status = mhi_outbox_open(folder, &s->outbox, err);
+    mhe_status status = mhe_outbox_open(folder, &s->outbox, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_claim(s->outbox, names, (int32_t)(sizeof names / sizeof names[0]), err);
+        status = mhe_outbox_claim(s->outbox, names, (int32_t)(sizeof names / sizeof names[0]), err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_spare(s->outbox, input, err);
+        status = mhe_outbox_spare(s->outbox, input, err);
     }
     if (status == MHE_OK) {
-        status = mhi_sink_sto(s->outbox, "reference.sto", "reference", labels, n_columns,
+        status = mhe_sink_sto(s->outbox, "reference.sto", "reference", labels, n_columns,
                               &s->reference, err);
     }
     if (status == MHE_OK) {
-        status = mhi_sink_trc(s->outbox, "markers.trc", markers, d->n_markers, s->rate, 1e-3, "mm",
+        status = mhe_sink_trc(s->outbox, "markers.trc", markers, d->n_markers, s->rate, 1e-3, "mm",
                               &s->trc, err);
     }
     if (status == MHE_OK) {
         status =
-            mhi_sink_sto(s->outbox, "emg.sto", "EMG, normalised", s->muscles, s->n_m, &s->emg, err);
+            mhe_sink_sto(s->outbox, "emg.sto", "EMG, normalised", s->muscles, s->n_m, &s->emg, err);
     }
     return status;
 }
@@ -127,14 +127,14 @@ mhe_status simulation_write(simulation *s, double time, mhe_error *err) {
     memcpy(row + 2 * s->n_q, a, n_m);
     memcpy(row + 2 * s->n_q + s->n_m, s->u, n_m);
     memcpy(row + 2 * s->n_q + 2 * s->n_m, muscles.force, n_m);
-    status = mhi_sink_row(s->reference, time, row, err);
+    status = mhe_sink_row(s->reference, time, row, err);
     if (status == MHE_OK) {
         status = mhi_system_markers(s->context, s->x, s->marker, NULL, err);
     }
     if (status == MHE_OK) {
-        status = mhi_sink_row(s->trc, time, s->marker, err);
+        status = mhe_sink_row(s->trc, time, s->marker, err);
     }
-    return status == MHE_OK ? mhi_sink_row(s->emg, time, s->u, err) : status;
+    return status == MHE_OK ? mhe_sink_row(s->emg, time, s->u, err) : status;
 }
 
 mhe_status simulation_step(simulation *s, double time, mhe_error *err) {
@@ -149,11 +149,11 @@ mhe_status simulation_step(simulation *s, double time, mhe_error *err) {
 }
 
 mhe_status simulation_commit(simulation *s, mhe_error *err) {
-    return mhi_outbox_commit(s->outbox, err);
+    return mhe_outbox_commit(s->outbox, err);
 }
 
 void simulation_close(simulation *s) {
-    mhi_outbox_close(s->outbox);
+    mhe_outbox_close(s->outbox);
     if (s->integrator_context != NULL) {
         s->integrator->context_destroy(s->integrator_context);
     }

@@ -6,9 +6,9 @@
 
 #include "base/arena.h"
 #include "config/run.h"
-#include "io/sink.h"
 #include "io/table.h"
 #include "model/system.h"
+#include <mhe/outbox.h>
 
 #include <mhe/integrator.h>
 
@@ -23,8 +23,8 @@ typedef struct simulation {
     const mhe_integrator_ops *integrator;
     void *integrator_self, *integrator_context;
     double *x_next, *row, *marker;
-    mhi_outbox *outbox;
-    mhi_sink *reference, *trc, *emg;
+    mhe_outbox *outbox;
+    mhe_sink *reference, *trc, *emg;
     mhi_arena arena;
 } simulation;
 

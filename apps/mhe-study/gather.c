@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "gather.h"
 
-#include "io/sink.h"
 #include "trial.h"
+#include <mhe/outbox.h>
 
 #include <stdlib.h>
 #include <string.h>
@@ -110,20 +110,20 @@ mhe_status gather(const study *s, const rows *r, const char *dir, mhe_error *err
         add_condition(s, &r->list[i], &timing);
         mhi_text_add(&timing, ",%s\n", r->list[i].timing);
     }
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhe_status status = results.failed || timing.failed
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_outbox_open(dir, &outbox, err);
+                            : mhe_outbox_open(dir, &outbox, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, "results.csv", results.data, err);
+        status = mhe_outbox_text(outbox, "results.csv", results.data, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, "timing.csv", timing.data, err);
+        status = mhe_outbox_text(outbox, "timing.csv", timing.data, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     mhi_text_free(&results);
     mhi_text_free(&timing);
     return status;

@@ -2,10 +2,10 @@
 #include "identity.h"
 
 #include "base/digest.h"
-#include "io/sink.h"
 #include "io/slurp.h"
 #include "plugin/loader.h"
 #include "study_json.h"
+#include <mhe/outbox.h>
 
 #include <inttypes.h>
 #include <mhe/version.h>
@@ -188,7 +188,7 @@ mhe_status identity_check(const char *dir, const mhi_text *text, int32_t *known,
 }
 
 mhe_status identity_write(const study *s, const char *dir, const mhi_text *text, mhe_error *err) {
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhi_text yaml = {0}, json = {0}, config = {0};
     for (const mhi_node *n = mhi_tree_root(s->tree)->first; n != NULL; n = n->next) {
         mhi_text_add(&yaml, "%s: ", n->key);
@@ -201,7 +201,7 @@ mhe_status identity_write(const study *s, const char *dir, const mhi_text *text,
         status = no_memory(err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_open(dir, &outbox, err);
+        status = mhe_outbox_open(dir, &outbox, err);
     }
     const struct {
         const char *name, *text;
@@ -210,12 +210,12 @@ mhe_status identity_write(const study *s, const char *dir, const mhi_text *text,
                  {"config.yaml", config.data},
                  {FILE_NAME, text->data}};
     for (size_t i = 0; i < sizeof files / sizeof files[0] && status == MHE_OK; i++) {
-        status = mhi_outbox_text(outbox, files[i].name, files[i].text, err);
+        status = mhe_outbox_text(outbox, files[i].name, files[i].text, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     mhi_text_free(&yaml);
     mhi_text_free(&json);
     mhi_text_free(&config);

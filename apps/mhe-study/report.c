@@ -5,9 +5,9 @@
 #include "config/options.h"
 #include "gather.h"
 #include "identity.h"
-#include "io/sink.h"
 #include "process.h"
 #include "session.h"
+#include <mhe/outbox.h>
 
 #include <stdlib.h>
 #include <string.h>
@@ -104,7 +104,7 @@ static mhe_status make_example(session *s, mhe_error *err) {
     example e = {0};
     mhi_record records[LEVELS_MAX + 1] = {{0}};
     mhi_text csv = {0};
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     if (node == NULL) {
         return MHE_OK;
     }
@@ -124,12 +124,12 @@ static mhe_status make_example(session *s, mhe_error *err) {
         status = make_records(&s->study, c, &e, records, err);
         status = status == MHE_OK ? write_example(&s->study, c, &e, records, &csv, err) : status;
     }
-    status = status == MHE_OK ? mhi_outbox_open(dir, &outbox, err) : status;
+    status = status == MHE_OK ? mhe_outbox_open(dir, &outbox, err) : status;
     if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, "noise_example.csv", csv.data, err);
+        status = mhe_outbox_text(outbox, "noise_example.csv", csv.data, err);
     }
-    status = status == MHE_OK ? mhi_outbox_commit(outbox, err) : status;
-    mhi_outbox_close(outbox);
+    status = status == MHE_OK ? mhe_outbox_commit(outbox, err) : status;
+    mhe_outbox_close(outbox);
     for (int32_t i = 0; i <= LEVELS_MAX; i++) {
         mhi_record_free(&records[i]);
     }

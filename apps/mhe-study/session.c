@@ -2,9 +2,9 @@
 #include "session.h"
 
 #include "identity.h"
-#include "io/sink.h"
 #include "study_json.h"
 #include "trial.h"
+#include <mhe/outbox.h>
 
 #include <errno.h>
 #include <fcntl.h>
@@ -30,9 +30,9 @@ mhe_status session_read(session *s, const char *file, const char *const *set, in
 }
 
 static mhe_status make_folder(const char *dir, mhe_error *err) {
-    mhi_outbox *outbox = NULL;
-    mhe_status status = mhi_outbox_open(dir, &outbox, err);
-    mhi_outbox_close(outbox);
+    mhe_outbox *outbox = NULL;
+    mhe_status status = mhe_outbox_open(dir, &outbox, err);
+    mhe_outbox_close(outbox);
     return status;
 }
 

@@ -2,9 +2,9 @@
 #define _XOPEN_SOURCE 700 /* realpath */
 #include "submit.h"
 
-#include "io/sink.h"
 #include "process.h"
 #include "session.h"
+#include <mhe/outbox.h>
 
 #include <errno.h>
 #include <stdlib.h>
@@ -43,7 +43,7 @@ static mhe_status write_script(session *s, const arguments *a, const char *progr
                                const char *study_file, mhe_error *err) {
     const int32_t workers = a->n_workers > 0 ? a->n_workers : 1;
     const char *folder = mhi_arena_format(&s->arena, "%s/slurm", dir);
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhi_text job = {0};
     mhi_text_add(&job,
                  "#!/bin/sh\n#SBATCH --job-name=%s\n#SBATCH --array=0-%d\n#SBATCH --ntasks=1\n"
@@ -61,10 +61,10 @@ static mhe_status write_script(session *s, const arguments *a, const char *progr
     mhi_text_add(&job, " --workers %d --quiet --shard \"$SLURM_ARRAY_TASK_ID/%d\"\n", (int)workers,
                  (int)a->n_tasks);
     mhe_status status =
-        job.failed || folder == NULL ? no_memory(err) : mhi_outbox_open(folder, &outbox, err);
-    status = status == MHE_OK ? mhi_outbox_text(outbox, "job.sh", job.data, err) : status;
-    status = status == MHE_OK ? mhi_outbox_commit(outbox, err) : status;
-    mhi_outbox_close(outbox);
+        job.failed || folder == NULL ? no_memory(err) : mhe_outbox_open(folder, &outbox, err);
+    status = status == MHE_OK ? mhe_outbox_text(outbox, "job.sh", job.data, err) : status;
+    status = status == MHE_OK ? mhe_outbox_commit(outbox, err) : status;
+    mhe_outbox_close(outbox);
     mhi_text_free(&job);
     return status;
 }

@@ -2,8 +2,8 @@
 #include "trial.h"
 
 #include "estimator/create.h"
-#include "io/sink.h"
 #include "measure.h"
+#include <mhe/outbox.h>
 
 #include <math.h>
 #include <string.h>
@@ -15,8 +15,8 @@ typedef struct tracking {
     mhe_estimator_info info;
     mhi_recording *recording;
     mhi_errors *errors;
-    mhi_outbox *outbox; /* of kept forces; NULL */
-    mhi_sink *forces;
+    mhe_outbox *outbox; /* of kept forces; NULL */
+    mhe_sink *forces;
     trial_result *result;
 } tracking;
 
@@ -40,7 +40,7 @@ static mhe_status open_all(tracking *t, const mhi_noise *noise, const mhe_host *
 static mhe_status take(tracking *t, const mhe_estimate *estimate, mhe_error *err) {
     mhe_status status = mhi_errors_add(t->errors, estimate, err);
     return status == MHE_OK && t->forces != NULL
-               ? mhi_sink_row(t->forces, estimate->time, estimate->force, err)
+               ? mhe_sink_row(t->forces, estimate->time, estimate->force, err)
                : status;
 }
 
@@ -92,9 +92,9 @@ static mhe_status open_forces(tracking *t, const study *s, task what, const char
     study_condition_text(s, t->condition, &title);
     mhe_status status = path.failed || name.failed || title.failed
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_outbox_open(path.data, &t->outbox, err);
+                            : mhe_outbox_open(path.data, &t->outbox, err);
     if (status == MHE_OK) {
-        status = mhi_sink_sto(t->outbox, name.data, title.data, t->info.muscle_names,
+        status = mhe_sink_sto(t->outbox, name.data, title.data, t->info.muscle_names,
                               t->info.n_muscles, &t->forces, err);
     }
     mhi_text_free(&path);
@@ -125,10 +125,10 @@ mhe_status trial_run(const study *s, task what, const char *dir, const mhe_host 
     if (status == MHE_OK) {
         const mhi_output_section *output = &c->run->output;
         mhi_errors_rmse(t.errors, output->skip_first, output->skip_last, &result->rmse);
-        status = t.outbox == NULL ? MHE_OK : mhi_outbox_commit(t.outbox, err);
+        status = t.outbox == NULL ? MHE_OK : mhe_outbox_commit(t.outbox, err);
     }
     result->seconds = measure_seconds() - begin;
-    mhi_outbox_close(t.outbox);
+    mhe_outbox_close(t.outbox);
     mhi_errors_free(t.errors);
     mhi_recording_free(t.recording);
     mhe_estimator_close(t.estimator);

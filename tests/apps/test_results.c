@@ -39,10 +39,10 @@ static void write_all(const mhe_text_list *formats) {
                                      .muscle_names = muscles,
                                      .marker_names = markers};
     const mhi_recording recording = {.rate = 100, .unit = 1e-3, .unit_name = "mm"};
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     results *r = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
     assert_int_equal(results_open(outbox, &info, &recording, formats, &r, &err), MHE_OK);
     for (int32_t k = 0; k < N; k++) {
         double v[24];
@@ -65,10 +65,10 @@ static void write_all(const mhe_text_list *formats) {
                                 .markers = v + 16};
         assert_int_equal(results_write(r, &e, v + 16, v + 4, &err), MHE_OK);
     }
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
     assert_string_equal(err.text, "");
     results_close(r);
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
 }
 
 static mhi_table *read_table(const char *name) {

@@ -39,13 +39,13 @@ static mhi_c3d_content usual(void) {
 }
 
 static mhe_status put(const mhi_c3d_content *content, mhe_error *err) {
-    mhi_outbox *outbox = NULL;
-    assert_int_equal(mhi_outbox_open(folder, &outbox, err), MHE_OK);
+    mhe_outbox *outbox = NULL;
+    assert_int_equal(mhe_outbox_open(folder, &outbox, err), MHE_OK);
     mhe_status status = mhi_outbox_c3d(outbox, "a.c3d", content, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     return status;
 }
 

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Can somebody else's files, links or runs spoil results, or results spoil somebody's files? */
 #include "io/outbox.h"
+
 #include "io/slurp.h"
 #include "support.h"
+#include <mhe/library.h>
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -66,11 +68,11 @@ static int32_t count_files(void) {
     return n - 2;
 }
 
-static mhi_outbox *open_claimed(void) {
-    mhi_outbox *outbox = NULL;
+static mhe_outbox *open_claimed(void) {
+    mhe_outbox *outbox = NULL;
     mhe_error err = {0};
-    if (mhi_outbox_open(folder, &outbox, &err) != MHE_OK ||
-        mhi_outbox_claim(outbox, names, 3, &err) != MHE_OK) {
+    if (mhe_outbox_open(folder, &outbox, &err) != MHE_OK ||
+        mhe_outbox_claim(outbox, names, 3, &err) != MHE_OK) {
         fail_msg("%s", err.text);
     }
     return outbox;
@@ -78,17 +80,17 @@ static mhi_outbox *open_claimed(void) {
 
 static void one_run_a_folder(void **state) {
     (void)state;
-    mhi_outbox *first = open_claimed(), *second = NULL;
+    mhe_outbox *first = open_claimed(), *second = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &second, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_claim(second, names, 3, &err), MHE_E_IO);
+    assert_int_equal(mhe_outbox_open(folder, &second, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_claim(second, names, 3, &err), MHE_E_IO);
     assert_non_null(strstr(err.text, "another run is writing its results here"));
-    mhi_outbox_close(second);
-    assert_int_equal(mhi_outbox_text(first, "a", "first", &err), MHE_OK);
-    assert_int_equal(mhi_outbox_commit(first, &err), MHE_OK);
-    mhi_outbox_close(first);
+    mhe_outbox_close(second);
+    assert_int_equal(mhe_outbox_text(first, "a", "first", &err), MHE_OK);
+    assert_int_equal(mhe_outbox_commit(first, &err), MHE_OK);
+    mhe_outbox_close(first);
     assert_int_equal(count_files(), 1); /* the lock is gone too */
-    mhi_outbox_close(open_claimed());   /* and free */
+    mhe_outbox_close(open_claimed());   /* and free */
     expect_text("a", "first");
 }
 
@@ -98,10 +100,10 @@ static void a_killed_run(void **state) {
     pid_t child = fork();
     assert_true(child >= 0);
     if (child == 0) {
-        mhi_outbox *outbox = NULL;
-        if (mhi_outbox_open(folder, &outbox, NULL) == MHE_OK &&
-            mhi_outbox_claim(outbox, names, 3, NULL) == MHE_OK &&
-            mhi_outbox_text(outbox, "a", "half", NULL) == MHE_OK) {
+        mhe_outbox *outbox = NULL;
+        if (mhe_outbox_open(folder, &outbox, NULL) == MHE_OK &&
+            mhe_outbox_claim(outbox, names, 3, NULL) == MHE_OK &&
+            mhe_outbox_text(outbox, "a", "half", NULL) == MHE_OK) {
             _exit(0);
         }
         _exit(1);
@@ -111,8 +113,8 @@ static void a_killed_run(void **state) {
     assert_int_equal(result, 0);
     assert_int_equal(count_files(), 2);
     put(".mine.tmp", "not of an outbox");
-    mhi_outbox *outbox = open_claimed();
-    mhi_outbox_close(outbox);
+    mhe_outbox *outbox = open_claimed();
+    mhe_outbox_close(outbox);
     assert_int_equal(count_files(), 1);
     expect_text(".mine.tmp", "not of an outbox");
 }
@@ -124,26 +126,26 @@ static void planted_links(void **state) {
     put("victim", "untouched");
     assert_int_equal(symlink("victim", path_of(".a.tmp")), 0);
     assert_int_equal(symlink("victim", path_of("a")), 0);
-    mhi_outbox *outbox = open_claimed();
-    assert_int_equal(mhi_outbox_text(outbox, "a", "result", &err), MHE_OK);
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    mhe_outbox *outbox = open_claimed();
+    assert_int_equal(mhe_outbox_text(outbox, "a", "result", &err), MHE_OK);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     struct stat info;
     assert_true(lstat(path_of("a"), &info) == 0 && S_ISREG(info.st_mode));
     expect_text("a", "result");
     expect_text("victim", "untouched");
 
     assert_int_equal(symlink("victim", path_of(".mhe-lock")), 0);
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_claim(outbox, names, 3, &err), MHE_E_IO);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_claim(outbox, names, 3, &err), MHE_E_IO);
     assert_non_null(strstr(err.text, ".mhe-lock: cannot be locked"));
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     expect_text("victim", "untouched");
     (void)unlink(path_of(".mhe-lock"));
     assert_int_equal(mkfifo(path_of(".mhe-lock"), 0666), 0); /* must not be waited for */
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_claim(outbox, names, 3, &err), MHE_E_IO);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_claim(outbox, names, 3, &err), MHE_E_IO);
+    mhe_outbox_close(outbox);
 }
 
 /* A library that writes by name gets the file, not what stands under its name by then. */
@@ -152,34 +154,34 @@ static void written_by_name(void **state) {
     mhe_error err = {0};
     mhi_outbox_file *file = NULL;
     put("victim", "untouched");
-    mhi_outbox *outbox = open_claimed();
+    mhe_outbox *outbox = open_claimed();
     assert_int_equal(mhi_outbox_add(outbox, "a", &file, &err), MHE_OK);
     FILE *again = fopen(file->open_path, "wb");
     assert_non_null(again);
     assert_true(fputs("by name", again) >= 0 && fclose(again) == 0);
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     expect_text("a", "by name");
 }
 
 /* A folder where a result goes: told at the claim, and where it comes later, before any rename. */
 static void all_or_nothing(void **state) {
     (void)state;
-    mhi_outbox *outbox = open_claimed();
+    mhe_outbox *outbox = open_claimed();
     mhe_error err = {0};
     put("a", "old a");
     for (int i = 0; i < 3; i++) {
-        assert_int_equal(mhi_outbox_text(outbox, names[i], "new", &err), MHE_OK);
+        assert_int_equal(mhe_outbox_text(outbox, names[i], "new", &err), MHE_OK);
     }
     assert_int_equal(mkdir(path_of("c"), 0777), 0);
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_E_IO);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_E_IO);
     assert_non_null(strstr(err.text, "c: a folder stands where a result goes"));
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     expect_text("a", "old a");
     assert_int_equal(count_files(), 2);
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_claim(outbox, names, 3, &err), MHE_E_IO);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_claim(outbox, names, 3, &err), MHE_E_IO);
+    mhe_outbox_close(outbox);
 }
 
 static void inputs_are_spared(void **state) {
@@ -187,46 +189,48 @@ static void inputs_are_spared(void **state) {
     mhe_error err = {0};
     put("b", "a recording");
     assert_int_equal(symlink("b", path_of("link to it")), 0);
-    mhi_outbox *outbox = open_claimed();
-    assert_int_equal(mhi_outbox_spare(outbox, NULL, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_spare(outbox, "/nowhere", &err), MHE_OK);
-    assert_int_equal(mhi_outbox_spare(outbox, path_of("b"), &err), MHE_E_ARGUMENT);
-    assert_int_equal(mhi_outbox_spare(outbox, path_of("link to it"), &err), MHE_E_ARGUMENT);
+    mhe_outbox *outbox = open_claimed();
+    assert_int_equal(mhe_outbox_spare(outbox, NULL, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_spare(outbox, "/nowhere", &err), MHE_OK);
+    assert_int_equal(mhe_outbox_spare(outbox, path_of("b"), &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_outbox_spare(outbox, path_of("link to it"), &err), MHE_E_ARGUMENT);
     assert_non_null(strstr(err.text, "would be overwritten"));
-    assert_int_equal(mhi_outbox_text(outbox, "d", "", &err), MHE_E_ARGUMENT);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_text(outbox, "d", "", &err), MHE_E_ARGUMENT);
+    mhe_outbox_close(outbox);
     expect_text("b", "a recording");
 }
 
 static void what_is_stale(void **state) {
     (void)state;
     mhe_error err = {0};
-    mhi_text stale = {0};
+    char *stale = NULL;
+    int32_t n = 0;
     const struct timespec once[2] = {{.tv_sec = 1}, {.tv_sec = 1}};
     for (int i = 0; i < 3; i++) {
         const char *const left[] = {"a", "c", "d"}; /* d is no name of a result */
         put(left[i], "1");
         assert_int_equal(utimensat(AT_FDCWD, path_of(left[i]), once, 0), 0);
     }
-    mhi_outbox *outbox = open_claimed();
-    assert_int_equal(mhi_outbox_text(outbox, "a", "2", &err), MHE_OK);
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_stale(outbox, &stale), 1);
-    assert_string_equal(stale.data, "c");
-    mhi_text_free(&stale);
-    mhi_outbox_close(outbox);
+    mhe_outbox *outbox = open_claimed();
+    assert_int_equal(mhe_outbox_text(outbox, "a", "2", &err), MHE_OK);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_stale(outbox, &stale, &n, &err), MHE_OK);
+    assert_int_equal(n, 1);
+    assert_string_equal(stale, "c");
+    mhe_free(stale);
+    mhe_outbox_close(outbox);
 }
 
 /* A folder made for a run that wrote nothing goes with it; one that was there stays. */
 static void folders_of_nothing(void **state) {
     (void)state;
     mhe_error err = {0};
-    mhi_outbox *outbox = NULL;
-    assert_int_equal(mhi_outbox_open(path_of("new"), &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_claim(outbox, names, 3, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    mhe_outbox *outbox = NULL;
+    assert_int_equal(mhe_outbox_open(path_of("new"), &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_claim(outbox, names, 3, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     assert_int_equal(count_files(), 0);
-    mhi_outbox_close(open_claimed());
+    mhe_outbox_close(open_claimed());
     assert_int_equal(access(folder, F_OK), 0);
 }
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The picture of a result folder, made of two seconds of invented motion. */
-#include "io/sink.h"
 #include "io/slurp.h"
 #include "picture.h"
 #include "support.h"
+#include <mhe/outbox.h>
 
 #include <math.h>
 #include <stdlib.h>
@@ -18,7 +18,7 @@ static char folder[256];
 static char labels[2 * N_Q + N_M][32];
 static const char *names[2 * N_Q + N_M];
 
-static void invent(mhi_outbox *outbox, const char *name, const char *q, const char *f,
+static void invent(mhe_outbox *outbox, const char *name, const char *q, const char *f,
                    double error) {
     static const char *const muscles[] = {"Pec", "Lat", "Delt", "Tri", "Bi"};
     int n = 0, has_forces = f != NULL;
@@ -32,8 +32,8 @@ static void invent(mhi_outbox *outbox, const char *name, const char *q, const ch
     for (int i = 0; i < n; i++) {
         names[i] = labels[i];
     }
-    mhi_sink *sink = NULL;
-    assert_int_equal(mhi_sink_sto(outbox, name, "t", names, n, &sink, NULL), MHE_OK);
+    mhe_sink *sink = NULL;
+    assert_int_equal(mhe_sink_sto(outbox, name, "t", names, n, &sink, NULL), MHE_OK);
     for (int k = 0; k <= 200; k++) {
         double t = 0.01 * k;
         int at = 0;
@@ -44,22 +44,22 @@ static void invent(mhi_outbox *outbox, const char *name, const char *q, const ch
             double base = (20 + 25 * ((i * 7) % N_M)) * (1 + sin(4 * t + 0.7 * i));
             row[at++] = k > 90 && k < 100 && i == 9 ? NAN : base * (1 + error * sin(50 * t));
         }
-        assert_int_equal(mhi_sink_row(sink, t, row, NULL), MHE_OK);
+        assert_int_equal(mhe_sink_row(sink, t, row, NULL), MHE_OK);
     }
 }
 
 static int make_results(void **state) {
     (void)state;
     (void)snprintf(folder, sizeof folder, "%s/picture's test", MHE_TEST_BINARY_DIR);
-    mhi_outbox *outbox = NULL;
-    if (mhi_outbox_open(folder, &outbox, NULL) != MHE_OK) {
+    mhe_outbox *outbox = NULL;
+    if (mhe_outbox_open(folder, &outbox, NULL) != MHE_OK) {
         return 1;
     }
     invent(outbox, "estimates.sto", "q_", NULL, 0.01);
     invent(outbox, "forces.sto", NULL, "", 0.1);
     invent(outbox, "reference.sto", "q_", "F_", 0);
-    mhe_status status = mhi_outbox_commit(outbox, NULL);
-    mhi_outbox_close(outbox);
+    mhe_status status = mhe_outbox_commit(outbox, NULL);
+    mhe_outbox_close(outbox);
     return status != MHE_OK;
 }
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Result files: what is written reads back; nothing appears half-written. */
-#include "io/sink.h"
 #include "io/slurp.h"
 #include "io/table.h"
 #include "support.h"
+#include <mhe/outbox.h>
 
 #include <dirent.h>
 #include <math.h>
@@ -67,17 +67,17 @@ static void expect_text(const char *name, const char *expected) {
 static void sto_reads_back(void **state) {
     (void)state;
     const char *labels[] = {"q.elbow", "F.BRA"};
-    mhi_outbox *outbox = NULL;
-    mhi_sink *sink = NULL;
+    mhe_outbox *outbox = NULL;
+    mhe_sink *sink = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_sink_sto(outbox, "x.sto", "estimates", labels, 2, &sink, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_sink_sto(outbox, "x.sto", "estimates", labels, 2, &sink, &err), MHE_OK);
     for (int i = 0; i < 1234; i++) {
         double row[] = {0.1 * i, i % 7 == 3 ? NAN : 1e-7 / (i + 1)};
-        assert_int_equal(mhi_sink_row(sink, 0.01 * i, row, &err), MHE_OK);
+        assert_int_equal(mhe_sink_row(sink, 0.01 * i, row, &err), MHE_OK);
     }
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     mhi_table *t = NULL;
     if (mhi_sto_read(path_of("x.sto"), &t, &err) != MHE_OK) {
         fail_msg("%s", err.text);
@@ -99,17 +99,17 @@ static void sto_reads_back(void **state) {
 static void trc_reads_back(void **state) {
     (void)state;
     const char *markers[] = {"A", "B b"};
-    mhi_outbox *outbox = NULL;
-    mhi_sink *sink = NULL;
+    mhe_outbox *outbox = NULL;
+    mhe_sink *sink = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_sink_trc(outbox, "m.trc", markers, 2, 100, 1e-3, "mm", &sink, &err),
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_sink_trc(outbox, "m.trc", markers, 2, 100, 1e-3, "mm", &sink, &err),
                      MHE_OK);
     const double rows[] = {0.001, 0.002, 0.003, NAN, NAN, NAN, 1, -2, 3e-9, 4, 5, 6};
-    assert_int_equal(mhi_sink_row(sink, 0, rows, &err), MHE_OK);
-    assert_int_equal(mhi_sink_row(sink, 0.01, rows + 6, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_sink_row(sink, 0, rows, &err), MHE_OK);
+    assert_int_equal(mhe_sink_row(sink, 0.01, rows + 6, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     char expected[512];
     (void)snprintf(expected, sizeof expected,
                    "PathFileType\t4\t(X/Y/Z)\tm.trc%18s\nDataRate\tCameraRate\tNumFrames\t"
@@ -135,50 +135,50 @@ static void nothing_without_commit(void **state) {
     (void)state;
     const char *labels[] = {"a"};
     double value = 1;
-    mhi_outbox *outbox = NULL;
-    mhi_sink *sink = NULL;
+    mhe_outbox *outbox = NULL;
+    mhe_sink *sink = NULL;
     FILE *old = fopen(path_of("x.sto"), "w");
     assert_non_null(old);
     assert_true(fputs("old", old) >= 0 && fclose(old) == 0);
-    assert_int_equal(mhi_outbox_open(folder, &outbox, NULL), MHE_OK);
-    assert_int_equal(mhi_sink_sto(outbox, "x.sto", "t", labels, 1, &sink, NULL), MHE_OK);
-    assert_int_equal(mhi_sink_row(sink, 0, &value, NULL), MHE_OK);
-    assert_int_equal(mhi_outbox_text(outbox, "summary.json", "{}", NULL), MHE_OK);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, NULL), MHE_OK);
+    assert_int_equal(mhe_sink_sto(outbox, "x.sto", "t", labels, 1, &sink, NULL), MHE_OK);
+    assert_int_equal(mhe_sink_row(sink, 0, &value, NULL), MHE_OK);
+    assert_int_equal(mhe_outbox_text(outbox, "summary.json", "{}", NULL), MHE_OK);
     assert_int_equal(count_files(), 3); /* the old one and two temporary ones */
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     assert_int_equal(count_files(), 1);
     expect_text("x.sto", "old");
 }
 
 static void names_are_plain_and_unique(void **state) {
     (void)state;
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_text(outbox, "../x", "", &err), MHE_E_ARGUMENT);
-    assert_int_equal(mhi_outbox_text(outbox, "", "", &err), MHE_E_ARGUMENT);
-    assert_int_equal(mhi_outbox_text(outbox, "a", "1", &err), MHE_OK);
-    assert_int_equal(mhi_outbox_text(outbox, "a", "2", &err), MHE_E_ARGUMENT);
-    assert_int_equal(mhi_outbox_commit(outbox, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_text(outbox, "../x", "", &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_outbox_text(outbox, "", "", &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_outbox_text(outbox, "a", "1", &err), MHE_OK);
+    assert_int_equal(mhe_outbox_text(outbox, "a", "2", &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     expect_text("a", "1");
     assert_int_equal(count_files(), 1);
 }
 
 static void folders_are_made(void **state) {
     (void)state;
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(path_of("a/b//c/"), &outbox, &err), MHE_OK);
-    mhi_outbox_close(outbox);
+    assert_int_equal(mhe_outbox_open(path_of("a/b//c/"), &outbox, &err), MHE_OK);
+    mhe_outbox_close(outbox);
     assert_int_equal(access(path_of("a/b/c"), F_OK), 0);
     (void)rmdir(path_of("a/b/c"));
     (void)rmdir(path_of("a/b"));
     (void)rmdir(path_of("a"));
     FILE *file = fopen(path_of("file"), "w");
     assert_true(file != NULL && fclose(file) == 0);
-    assert_int_equal(mhi_outbox_open(path_of("file"), &outbox, &err), MHE_E_IO);
-    assert_int_equal(mhi_outbox_open(path_of("file/below"), &outbox, &err), MHE_E_IO);
+    assert_int_equal(mhe_outbox_open(path_of("file"), &outbox, &err), MHE_E_IO);
+    assert_int_equal(mhe_outbox_open(path_of("file/below"), &outbox, &err), MHE_E_IO);
     assert_non_null(strstr(err.text, "folder cannot be made"));
     assert_null(outbox);
 }
@@ -192,24 +192,24 @@ static void full_disk(void **state) {
     small.rlim_cur = 1 << 16;
     (void)signal(SIGXFSZ, SIG_IGN);
     const char *labels[] = {"a"};
-    mhi_outbox *outbox = NULL;
-    mhi_sink *sink = NULL;
+    mhe_outbox *outbox = NULL;
+    mhe_sink *sink = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_outbox_text(outbox, "config.yaml", "a: 1\n", &err), MHE_OK);
-    assert_int_equal(mhi_sink_sto(outbox, "x.sto", "t", labels, 1, &sink, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_text(outbox, "config.yaml", "a: 1\n", &err), MHE_OK);
+    assert_int_equal(mhe_sink_sto(outbox, "x.sto", "t", labels, 1, &sink, &err), MHE_OK);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
     mhe_status status = MHE_OK;
     for (int i = 0; i < 20000 && status == MHE_OK; i++) {
         double value = 1.0 / (i + 1);
-        status = mhi_sink_row(sink, i, &value, &err);
+        status = mhe_sink_row(sink, i, &value, &err);
     }
-    mhe_status commit = mhi_outbox_commit(outbox, NULL);
+    mhe_status commit = mhe_outbox_commit(outbox, NULL);
     (void)setrlimit(RLIMIT_FSIZE, &before);
     assert_int_equal(status, MHE_E_IO);
     assert_non_null(strstr(err.text, "x.sto: cannot be written: File too large"));
     assert_int_equal(commit, MHE_E_IO);
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     assert_int_equal(count_files(), 0);
 }
 
@@ -223,17 +223,17 @@ static void full_disk_at_commit(void **state) {
     (void)signal(SIGXFSZ, SIG_IGN);
     const char *labels[] = {"a"};
     double value = 1;
-    mhi_outbox *outbox = NULL;
-    mhi_sink *sink = NULL;
+    mhe_outbox *outbox = NULL;
+    mhe_sink *sink = NULL;
     mhe_error err = {0};
-    assert_int_equal(mhi_outbox_open(folder, &outbox, &err), MHE_OK);
-    assert_int_equal(mhi_sink_sto(outbox, "x.sto", "t", labels, 1, &sink, &err), MHE_OK);
-    assert_int_equal(mhi_sink_row(sink, 0, &value, &err), MHE_OK);
+    assert_int_equal(mhe_outbox_open(folder, &outbox, &err), MHE_OK);
+    assert_int_equal(mhe_sink_sto(outbox, "x.sto", "t", labels, 1, &sink, &err), MHE_OK);
+    assert_int_equal(mhe_sink_row(sink, 0, &value, &err), MHE_OK);
     assert_int_equal(setrlimit(RLIMIT_FSIZE, &none), 0);
-    mhe_status commit = mhi_outbox_commit(outbox, &err);
+    mhe_status commit = mhe_outbox_commit(outbox, &err);
     (void)setrlimit(RLIMIT_FSIZE, &before);
     assert_int_equal(commit, MHE_E_IO);
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     assert_int_equal(count_files(), 0);
 }
 

@@ -36,6 +36,19 @@ void mhi_text_free(mhi_text *text) {
     *text = (mhi_text){0};
 }
 
+mhe_status mhi_text_give(mhi_text *text, char **out, mhe_error *err) {
+    if (text->data == NULL || text->failed) {
+        mhi_text_add(text, "%s", ""); /* an empty text is one too */
+    }
+    if (text->data == NULL || text->failed) {
+        mhi_text_free(text);
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    *out = text->data;
+    *text = (mhi_text){0};
+    return MHE_OK;
+}
+
 #define NEAREST_MAX 64
 
 /* Levenshtein distance without regard to letter case; names longer than NEAREST_MAX are compared by

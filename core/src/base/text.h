@@ -15,6 +15,9 @@ typedef struct mhi_text {
 
 MHE_PRINTF(2, 3) void mhi_text_add(mhi_text *text, const char *format, ...);
 void mhi_text_free(mhi_text *text);
+/* Hands what was built to a caller outside, who gives it back with mhe_free(). MHE_E_MEMORY: it
+ * failed; the text is freed. */
+mhe_status mhi_text_give(mhi_text *text, char **out, mhe_error *err);
 
 /* The entry of names [n] nearest to `name` (edit distance, letter case free); NULL if none is near
  * enough to be what was meant. NULL entries are passed over. */

@@ -2,9 +2,9 @@
 #include "control/solution_cache.h"
 
 #include "base/digest.h"
-#include "io/number.h"
-#include "io/sink.h"
+#include "base/number.h"
 #include "io/slurp.h"
+#include <mhe/outbox.h>
 
 #include <inttypes.h>
 #include <math.h>
@@ -105,7 +105,7 @@ static void write_numbers(const mhi_trajectory *t, const mhe_solve_info *info, m
 mhe_status mhi_solution_write(const char *dir, const mhi_text *key, const mhi_trajectory *t,
                               const mhe_solve_info *info, mhe_error *err) {
     mhi_text body = {0}, file = {0};
-    mhi_outbox *outbox = NULL;
+    mhe_outbox *outbox = NULL;
     char name[32];
     file_name(key, name);
     const mhi_c_locale saved = mhi_c_locale_begin();
@@ -116,14 +116,14 @@ mhe_status mhi_solution_write(const char *dir, const mhi_text *key, const mhi_tr
         mhi_text_add(&file, HEAD "%s", mhi_digest(body.data, body.length), body.data);
     }
     mhe_status status = body.failed || file.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                                   : mhi_outbox_open(dir, &outbox, err);
+                                                   : mhe_outbox_open(dir, &outbox, err);
     if (status == MHE_OK) {
-        status = mhi_outbox_text(outbox, name, file.data, err);
+        status = mhe_outbox_text(outbox, name, file.data, err);
     }
     if (status == MHE_OK) {
-        status = mhi_outbox_commit(outbox, err);
+        status = mhe_outbox_commit(outbox, err);
     }
-    mhi_outbox_close(outbox);
+    mhe_outbox_close(outbox);
     mhi_text_free(&body);
     mhi_text_free(&file);
     return status;

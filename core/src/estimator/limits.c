@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* limits.c: the residual torque that each coordinate may have. */
+#include "base/number.h"
 #include "estimator/estimator_private.h"
-#include "io/number.h"
 
 #include <string.h>
 

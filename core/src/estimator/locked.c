@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* locked.c: the coordinates that model.locked and model.locked_at take out of the estimate. */
+#include "base/number.h"
 #include "estimator/estimator_private.h"
 #include "io/model_file.h"
-#include "io/number.h"
 
 #include <stdlib.h>
 #include <string.h>

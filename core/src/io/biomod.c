@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* biomod.c: .bioMod reader (biorbd, versions 1 to 4): header, segments, markers. */
 #include "io/biomod.h"
+#include "base/number.h"
 #include "io/model_file.h"
-#include "io/number.h"
 
 #include <ctype.h>
 #include <math.h>

@@ -218,7 +218,7 @@ static mhe_status check(const char *name, const mhi_c3d_content *c, mhe_error *e
     return MHE_OK;
 }
 
-mhe_status mhi_outbox_c3d(mhi_outbox *outbox, const char *name, const mhi_c3d_content *c,
+mhe_status mhi_outbox_c3d(mhe_outbox *outbox, const char *name, const mhi_c3d_content *c,
                           mhe_error *err) {
     mhe_status status = check(name, c, err);
     if (status != MHE_OK) {

@@ -5,7 +5,7 @@
 #ifndef MHI_C3D_WRITE_H
 #define MHI_C3D_WRITE_H
 
-#include "io/sink.h"
+#include <mhe/outbox.h>
 
 typedef struct mhi_c3d_content {
     const char *const *markers;  /* [n_markers] */
@@ -21,7 +21,7 @@ typedef struct mhi_c3d_content {
 /* A whole file; lengths are written in mm. MHE_E_INPUT: more than a .c3d holds (255 markers or
  * channels, 65535 frames or analog samples a frame), a first time that is no multiple of a frame's
  * time from 0 on, a missing analog sample; MHE_E_IO. [cold] */
-mhe_status mhi_outbox_c3d(mhi_outbox *outbox, const char *name, const mhi_c3d_content *content,
+mhe_status mhi_outbox_c3d(mhe_outbox *outbox, const char *name, const mhi_c3d_content *content,
                           mhe_error *err);
 
 #endif

@@ -3,7 +3,7 @@
 #ifndef MHI_LENGTH_UNIT_H
 #define MHI_LENGTH_UNIT_H
 
-#include "io/number.h"
+#include "base/number.h"
 
 /* A unit in any of its spellings (mm, "[mm]", millimeters, Metre, inch ...). */
 typedef struct mhi_length_unit {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* osim.c: OpenSim model reader, layouts of OpenSim 2.x to 4.x. */
 #include "io/osim.h"
+#include "base/number.h"
 #include "io/model_file.h"
-#include "io/number.h"
 
 #include <limits.h>
 #include <string.h>

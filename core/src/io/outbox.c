@@ -5,6 +5,7 @@
  * followed nor written to. At commit old and new files exchange their names, so that a failure
  * half-way can be undone. */
 #define _GNU_SOURCE /* renameat2 */
+#include "base/need.h"
 #include "io/outbox_private.h"
 
 #include <errno.h>
@@ -48,14 +49,18 @@ static mhe_status make_folders(const char *dir, int *made, mhe_error *err) {
                : MHE_OK;
 }
 
-mhe_status mhi_outbox_open(const char *dir, mhi_outbox **outbox, mhe_error *err) {
+mhe_status mhe_outbox_open(const char *dir, mhe_outbox **outbox, mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"dir", dir}, {"outbox", outbox});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     *outbox = NULL;
     int made = 0;
     mhe_status status = make_folders(dir, &made, err);
     if (status != MHE_OK) {
         return status;
     }
-    mhi_outbox *opened = calloc(1, sizeof *opened);
+    mhe_outbox *opened = calloc(1, sizeof *opened);
     if (opened == NULL || (opened->dir = strdup(dir)) == NULL) {
         free(opened);
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", dir);
@@ -98,7 +103,7 @@ static uint32_t any_number(void) {
 }
 
 /* Opens a new file under a temporary name. */
-static mhe_status open_temporary(const mhi_outbox *outbox, mhi_outbox_file *file, mhe_error *err) {
+static mhe_status open_temporary(const mhe_outbox *outbox, mhi_outbox_file *file, mhe_error *err) {
     const size_t size = strlen(file->name) + sizeof "." MHI_OUTBOX_MARK "00000000" MHI_OUTBOX_END;
     file->temporary = malloc(size);
     if (file->temporary == NULL) {
@@ -131,7 +136,7 @@ static mhe_status open_temporary(const mhi_outbox *outbox, mhi_outbox_file *file
     return MHE_OK;
 }
 
-static mhe_status check_name(const mhi_outbox *outbox, const char *name, mhe_error *err) {
+static mhe_status check_name(const mhe_outbox *outbox, const char *name, mhe_error *err) {
     if (*name == '\0' || strchr(name, '/') != NULL) {
         return mhe_fail(err, MHE_E_ARGUMENT, "'%s' is no plain file name", name);
     }
@@ -150,7 +155,7 @@ static mhe_status check_name(const mhi_outbox *outbox, const char *name, mhe_err
                           "'%s' is not in the list of files that the folder was claimed for", name);
 }
 
-mhe_status mhi_outbox_add(mhi_outbox *outbox, const char *name, mhi_outbox_file **file,
+mhe_status mhi_outbox_add(mhe_outbox *outbox, const char *name, mhi_outbox_file **file,
                           mhe_error *err) {
     *file = NULL;
     mhe_status status = check_name(outbox, name, err);
@@ -185,7 +190,11 @@ mhe_status mhi_outbox_write_failed(mhi_outbox_file *file, mhe_error *err) {
     return mhe_fail(err, MHE_E_IO, "%s: cannot be written: %s", file->path, strerror(file->fault));
 }
 
-mhe_status mhi_outbox_text(mhi_outbox *outbox, const char *name, const char *text, mhe_error *err) {
+mhe_status mhe_outbox_text(mhe_outbox *outbox, const char *name, const char *text, mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"outbox", outbox}, {"name", name}, {"text", text});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     mhi_outbox_file *file = NULL;
     mhe_status status = mhi_outbox_add(outbox, name, &file, err);
     if (status == MHE_OK && (fputs(text, file->stream) < 0 || fflush(file->stream) != 0)) {
@@ -210,7 +219,7 @@ static mhe_status settle(mhi_outbox_file *file, mhe_error *err) {
     return status == MHE_OK && closed != 0 ? mhi_outbox_write_failed(file, err) : status;
 }
 
-mhe_status mhi_outbox_check_target(const mhi_outbox *outbox, const char *name, mhe_error *err) {
+mhe_status mhi_outbox_check_target(const mhe_outbox *outbox, const char *name, mhe_error *err) {
     struct stat target, folder;
     if (fstatat(outbox->folder, name, &target, AT_SYMLINK_NOFOLLOW) != 0) {
         return errno == ENOENT ? MHE_OK
@@ -232,7 +241,7 @@ mhe_status mhi_outbox_check_target(const mhi_outbox *outbox, const char *name, m
 
 /* 0: done. An old file gets the temporary name; where the file system cannot exchange, it is gone.
  */
-static int place(const mhi_outbox *outbox, mhi_outbox_file *file) {
+static int place(const mhe_outbox *outbox, mhi_outbox_file *file) {
     const int at = outbox->folder;
     if (renameat2(at, file->temporary, at, file->name, RENAME_EXCHANGE) == 0) {
         file->placed = EXCHANGED;
@@ -250,7 +259,7 @@ static int place(const mhi_outbox *outbox, mhi_outbox_file *file) {
 }
 
 /* As before the commit, as far as can be. */
-static void displace(const mhi_outbox *outbox, mhi_outbox_file *file) {
+static void displace(const mhe_outbox *outbox, mhi_outbox_file *file) {
     const int at = outbox->folder;
     if (file->placed == EXCHANGED) {
         (void)renameat2(at, file->temporary, at, file->name, RENAME_EXCHANGE);
@@ -260,7 +269,7 @@ static void displace(const mhi_outbox *outbox, mhi_outbox_file *file) {
     file->placed = NOT_PLACED;
 }
 
-static mhe_status place_all(mhi_outbox *outbox, mhe_error *err) {
+static mhe_status place_all(mhe_outbox *outbox, mhe_error *err) {
     for (mhi_outbox_file *file = outbox->files; file != NULL; file = file->next) {
         if (place(outbox, file) != 0) {
             mhe_status status =
@@ -274,7 +283,7 @@ static mhe_status place_all(mhi_outbox *outbox, mhe_error *err) {
     return MHE_OK;
 }
 
-static void drop_files(mhi_outbox *outbox) {
+static void drop_files(mhe_outbox *outbox) {
     while (outbox->files != NULL) {
         mhi_outbox_file *file = outbox->files;
         outbox->files = file->next;
@@ -285,7 +294,11 @@ static void drop_files(mhi_outbox *outbox) {
     }
 }
 
-mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err) {
+mhe_status mhe_outbox_commit(mhe_outbox *outbox, mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"outbox", outbox});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     mhe_status status = MHE_OK;
     for (mhi_outbox_file *file = outbox->files; file != NULL && status == MHE_OK;
          file = file->next) {
@@ -305,7 +318,7 @@ mhe_status mhi_outbox_commit(mhi_outbox *outbox, mhe_error *err) {
     return status;
 }
 
-void mhi_outbox_abandon(const mhi_outbox *outbox) {
+void mhe_outbox_abandon(const mhe_outbox *outbox) {
     const mhi_outbox_file *file = outbox == NULL ? NULL : outbox->files;
     for (; file != NULL; file = file->next) {
         (void)unlinkat(outbox->folder, file->temporary, 0);
@@ -315,7 +328,7 @@ void mhi_outbox_abandon(const mhi_outbox *outbox) {
     }
 }
 
-void mhi_outbox_close(mhi_outbox *outbox) {
+void mhe_outbox_close(mhe_outbox *outbox) {
     if (outbox == NULL) {
         return;
     }

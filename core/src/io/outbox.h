@@ -3,7 +3,7 @@
 #ifndef MHI_OUTBOX_H
 #define MHI_OUTBOX_H
 
-#include "io/sink.h"
+#include <mhe/outbox.h>
 
 /* One file of an outbox, still under its temporary name. */
 typedef struct mhi_outbox_file {
@@ -22,7 +22,7 @@ typedef struct mhi_outbox_file {
 } mhi_outbox_file;
 
 /* Opens a file; `name` is a plain name without a folder. MHE_E_IO, MHE_E_ARGUMENT. */
-mhe_status mhi_outbox_add(mhi_outbox *outbox, const char *name, mhi_outbox_file **file,
+mhe_status mhi_outbox_add(mhe_outbox *outbox, const char *name, mhi_outbox_file **file,
                           mhe_error *err);
 /* To be called at once after a failed write: MHE_E_IO with its reason. The file cannot be committed
  * any more. */

@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* outbox_claim.c: a result folder for one run alone. */
+#include "base/need.h"
+#include "base/text.h"
 #include "io/outbox_private.h"
 
 #include <dirent.h>
@@ -12,14 +14,14 @@
 
 #define TRIES 100
 
-static mhe_status cannot_lock(const mhi_outbox *outbox, int reason, mhe_error *err) {
+static mhe_status cannot_lock(const mhe_outbox *outbox, int reason, mhe_error *err) {
     return mhe_fail(err, MHE_E_IO, "%s/" MHI_OUTBOX_LOCK ": cannot be locked: %s", outbox->dir,
                     strerror(reason));
 }
 
 /* The lock file is removed before the lock is given back: who got the lock of a removed file tries
  * again. `file`: open, or -1: try again. */
-static mhe_status try_lock(const mhi_outbox *outbox, int *file, mhe_error *err) {
+static mhe_status try_lock(const mhe_outbox *outbox, int *file, mhe_error *err) {
     *file = openat(outbox->folder, MHI_OUTBOX_LOCK,
                    O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC | O_NONBLOCK, 0666);
     if (*file < 0) {
@@ -44,7 +46,7 @@ static mhe_status try_lock(const mhi_outbox *outbox, int *file, mhe_error *err) 
 }
 
 /* Its time is that of the claim, by the clock of the file system. */
-static void note_time(mhi_outbox *outbox) {
+static void note_time(mhe_outbox *outbox) {
     struct stat info;
     if (futimens(outbox->lock, NULL) == 0 && fstat(outbox->lock, &info) == 0) {
         outbox->claimed_at = info.st_mtim;
@@ -62,7 +64,7 @@ static int is_temporary(const char *name) {
 }
 
 /* What a run that was killed left behind: no other one is at work here. */
-static void sweep(const mhi_outbox *outbox) {
+static void sweep(const mhe_outbox *outbox) {
     const int again = openat(outbox->folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *dir = again < 0 ? NULL : fdopendir(again);
     if (dir == NULL) {
@@ -79,8 +81,12 @@ static void sweep(const mhi_outbox *outbox) {
     (void)closedir(dir);
 }
 
-mhe_status mhi_outbox_claim(mhi_outbox *outbox, const char *const *names, int32_t n_names,
+mhe_status mhe_outbox_claim(mhe_outbox *outbox, const char *const *names, int32_t n_names,
                             mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"outbox", outbox}, {"names", names});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     mhe_status status = MHE_OK;
     for (int i = 0; i < TRIES && outbox->lock < 0 && status == MHE_OK; i++) {
         status = try_lock(outbox, &outbox->lock, err);
@@ -108,7 +114,7 @@ mhe_status mhi_outbox_claim(mhi_outbox *outbox, const char *const *names, int32_
     return status;
 }
 
-void mhi_outbox_unlock(mhi_outbox *outbox) {
+void mhi_outbox_unlock(mhe_outbox *outbox) {
     if (outbox->lock >= 0) {
         (void)unlinkat(outbox->folder, MHI_OUTBOX_LOCK, 0);
         (void)close(outbox->lock);
@@ -116,7 +122,11 @@ void mhi_outbox_unlock(mhi_outbox *outbox) {
     }
 }
 
-mhe_status mhi_outbox_spare(const mhi_outbox *outbox, const char *input, mhe_error *err) {
+mhe_status mhe_outbox_spare(const mhe_outbox *outbox, const char *input, mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"outbox", outbox});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     struct stat in, out;
     if (input == NULL || stat(input, &in) != 0) {
         return MHE_OK;
@@ -135,15 +145,21 @@ static int earlier(struct timespec a, struct timespec b) {
     return a.tv_sec < b.tv_sec || (a.tv_sec == b.tv_sec && a.tv_nsec < b.tv_nsec);
 }
 
-int32_t mhi_outbox_stale(const mhi_outbox *outbox, mhi_text *out) {
-    int32_t n = 0;
+mhe_status mhe_outbox_stale(const mhe_outbox *outbox, char **names, int32_t *n, mhe_error *err) {
+    mhe_status status = MHI_NEED(err, {"outbox", outbox}, {"names", names}, {"n", n});
+    mhi_text out = {0};
+    if (status != MHE_OK) {
+        return status;
+    }
+    *n = 0;
+    *names = NULL;
     for (int32_t i = 0; i < outbox->n_names; i++) {
         struct stat info;
         if (fstatat(outbox->folder, outbox->names[i], &info, AT_SYMLINK_NOFOLLOW) == 0 &&
             earlier(info.st_mtim, outbox->claimed_at)) {
-            mhi_text_add(out, "%s%s", n == 0 ? "" : ", ", outbox->names[i]);
-            n++;
+            mhi_text_add(&out, "%s%s", *n == 0 ? "" : ", ", outbox->names[i]);
+            ++*n;
         }
     }
-    return n;
+    return mhi_text_give(&out, names, err);
 }

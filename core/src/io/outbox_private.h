@@ -7,7 +7,7 @@
 
 #include <time.h>
 
-struct mhi_outbox {
+struct mhe_outbox {
     char *dir;
     int folder; /* open: all names are looked up in it, whatever becomes of its path */
     int lock;   /* open file that is locked; -1: not claimed */
@@ -19,9 +19,9 @@ struct mhi_outbox {
 };
 
 /* Gives the lock back; its file is removed. */
-void mhi_outbox_unlock(mhi_outbox *outbox);
+void mhi_outbox_unlock(mhe_outbox *outbox);
 /* MHE_OK where `name` may get a file: there is none, or a file (or link) that can be replaced. */
-mhe_status mhi_outbox_check_target(const mhi_outbox *outbox, const char *name, mhe_error *err);
+mhe_status mhi_outbox_check_target(const mhe_outbox *outbox, const char *name, mhe_error *err);
 
 /* A temporary name is '.' NAME MHI_OUTBOX_MARK, eight hexadecimal digits, MHI_OUTBOX_END. */
 #define MHI_OUTBOX_MARK ".mhe-"

@@ -2,17 +2,18 @@
 /* Rows of .sto and .trc. The number of rows stands in the header but is known last: the header is
  * written again at the end, made as long as the first time by blanks behind its first, free line.
  */
-#include "io/sink.h"
+#include <mhe/outbox.h>
 
+#include "base/need.h"
+#include "base/number.h"
 #include "base/text.h"
-#include "io/number.h"
 #include "io/outbox.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-struct mhi_sink {
+struct mhe_sink {
     mhi_outbox_file *file;
     char *first_line;
     mhi_text header[3]; /* its further text; the number of rows stands between the parts */
@@ -24,7 +25,7 @@ struct mhi_sink {
 
 #define COUNT_DIGITS 10 /* of INT32_MAX */
 
-static mhe_status write_header(const mhi_sink *sink, mhe_error *err) {
+static mhe_status write_header(const mhe_sink *sink, mhe_error *err) {
     char count[16];
     int32_t digits = snprintf(count, sizeof count, "%d", sink->n_rows);
     int32_t pad = sink->n_counts * (COUNT_DIGITS - digits);
@@ -38,14 +39,14 @@ static mhe_status write_header(const mhi_sink *sink, mhe_error *err) {
 }
 
 static mhe_status complete(mhi_outbox_file *file, mhe_error *err) {
-    const mhi_sink *sink = file->owner;
+    const mhe_sink *sink = file->owner;
     if (fseek(file->stream, 0, SEEK_SET) != 0) {
         return mhi_outbox_write_failed(file, err);
     }
     return write_header(sink, err);
 }
 
-static void free_sink(mhi_sink *sink) {
+static void free_sink(mhe_sink *sink) {
     for (int32_t i = 0; i < 3; i++) {
         mhi_text_free(&sink->header[i]);
     }
@@ -58,7 +59,7 @@ static void release(mhi_outbox_file *file) {
 }
 
 /* Puts a sink whose header is ready into the outbox, or frees it. */
-static mhe_status open_sink(mhi_outbox *outbox, const char *name, mhi_sink *made, mhi_sink **sink,
+static mhe_status open_sink(mhe_outbox *outbox, const char *name, mhe_sink *made, mhe_sink **sink,
                             mhe_error *err) {
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i <= made->n_counts; i++) {
@@ -81,8 +82,8 @@ static mhe_status open_sink(mhi_outbox *outbox, const char *name, mhi_sink *made
     return status;
 }
 
-static mhi_sink *new_sink(int32_t n_columns, int32_t n_counts) {
-    mhi_sink *made = calloc(1, sizeof *made);
+static mhe_sink *new_sink(int32_t n_columns, int32_t n_counts) {
+    mhe_sink *made = calloc(1, sizeof *made);
     if (made != NULL) {
         made->n_columns = n_columns;
         made->n_counts = n_counts;
@@ -91,11 +92,16 @@ static mhi_sink *new_sink(int32_t n_columns, int32_t n_counts) {
     return made;
 }
 
-mhe_status mhi_sink_sto(mhi_outbox *outbox, const char *name, const char *title,
-                        const char *const *labels, int32_t n_columns, mhi_sink **sink,
+mhe_status mhe_sink_sto(mhe_outbox *outbox, const char *name, const char *title,
+                        const char *const *labels, int32_t n_columns, mhe_sink **sink,
                         mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"outbox", outbox}, {"name", name}, {"title", title},
+                                 {"labels", labels}, {"sink", sink});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     *sink = NULL;
-    mhi_sink *made = new_sink(n_columns, 1);
+    mhe_sink *made = new_sink(n_columns, 1);
     if (made == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
     }
@@ -109,11 +115,16 @@ mhe_status mhi_sink_sto(mhi_outbox *outbox, const char *name, const char *title,
     return open_sink(outbox, name, made, sink, err);
 }
 
-mhe_status mhi_sink_trc(mhi_outbox *outbox, const char *name, const char *const *markers,
+mhe_status mhe_sink_trc(mhe_outbox *outbox, const char *name, const char *const *markers,
                         int32_t n_markers, double rate, double unit, const char *unit_name,
-                        mhi_sink **sink, mhe_error *err) {
+                        mhe_sink **sink, mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"outbox", outbox}, {"name", name}, {"markers", markers},
+                                 {"unit_name", unit_name}, {"sink", sink});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     *sink = NULL;
-    mhi_sink *made = new_sink(3 * n_markers, 2);
+    mhe_sink *made = new_sink(3 * n_markers, 2);
     if (made == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
     }
@@ -155,10 +166,15 @@ static void add_csv_label(mhi_text *line, const char *label) {
     mhi_text_add(line, "\"");
 }
 
-mhe_status mhi_sink_csv(mhi_outbox *outbox, const char *name, const char *const *labels,
-                        int32_t n_columns, mhi_sink **sink, mhe_error *err) {
+mhe_status mhe_sink_csv(mhe_outbox *outbox, const char *name, const char *const *labels,
+                        int32_t n_columns, mhe_sink **sink, mhe_error *err) {
+    mhe_status needed =
+        MHI_NEED(err, {"outbox", outbox}, {"name", name}, {"labels", labels}, {"sink", sink});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     *sink = NULL;
-    mhi_sink *made = new_sink(n_columns, 0);
+    mhe_sink *made = new_sink(n_columns, 0);
     if (made == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "%s: out of memory", name);
     }
@@ -173,7 +189,11 @@ mhe_status mhi_sink_csv(mhi_outbox *outbox, const char *name, const char *const 
     return open_sink(outbox, name, made, sink, err);
 }
 
-mhe_status mhi_sink_row(mhi_sink *sink, double time, const double *values, mhe_error *err) {
+mhe_status mhe_sink_row(mhe_sink *sink, double time, const double *values, mhe_error *err) {
+    mhe_status needed = MHI_NEED(err, {"sink", sink}, {"values", values});
+    if (needed != MHE_OK) {
+        return needed;
+    }
     FILE *out = sink->file->stream;
     mhi_c_locale locale = mhi_c_locale_begin();
     int failed = sink->is_trc ? fprintf(out, "%d\t%.10g", sink->n_rows + 1, time) < 0

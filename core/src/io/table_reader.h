@@ -4,8 +4,8 @@
 #define MHI_TABLE_READER_H
 
 #include "base/kinds.h"
+#include "base/number.h"
 #include "io/decode.h"
-#include "io/number.h"
 #include "io/table.h"
 
 typedef struct mhi_table_reader {

@@ -2,7 +2,7 @@
 /* xdf.c: the chunks of an .xdf file. */
 #include "io/xdf.h"
 
-#include "io/number.h"
+#include "base/number.h"
 #include "io/slurp.h"
 
 #include <libxml/parser.h>

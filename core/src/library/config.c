@@ -89,19 +89,6 @@ mhe_status mhi_config_model(mhe_config *c, const mhe_description **model, mhe_er
     return status;
 }
 
-mhe_status mhi_text_give(mhi_text *text, char **out, mhe_error *err) {
-    if (text->data == NULL || text->failed) {
-        mhi_text_add(text, "%s", ""); /* an empty text is one too */
-    }
-    if (text->data == NULL || text->failed) {
-        mhi_text_free(text);
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    *out = text->data;
-    *text = (mhi_text){0};
-    return MHE_OK;
-}
-
 mhe_status mhe_config_write(mhe_config *c, char **text, mhe_error *err) {
     mhe_status status = MHI_NEED(err, {"config", c}, {"text", text});
     if (status != MHE_OK) {

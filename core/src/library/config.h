@@ -19,7 +19,4 @@ struct mhe_config {
 /* The model that the config names, read once. Lent. MHE_E_INPUT, MHE_E_CONFIG. [cold] */
 mhe_status mhi_config_model(mhe_config *config, const mhe_description **model, mhe_error *err);
 
-/* A text that was built, for a caller outside. MHE_E_MEMORY where building it failed. */
-mhe_status mhi_text_give(mhi_text *text, char **out, mhe_error *err);
-
 #endif

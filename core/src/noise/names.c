@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* names.c: maps from the names of markers, segments and muscles to spans of time or fractions. */
-#include "io/number.h"
+#include "base/number.h"
 #include "noise/parts.h"
 
 #include <string.h>
