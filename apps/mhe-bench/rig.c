@@ -78,6 +78,7 @@ mhe_status rig_create(const variant *v, int32_t estimates, const mhe_host *loud,
         return status;
     }
     const mhi_system *system = mhi_estimator_system(r->estimator);
+    r->info.size = sizeof r->info;
     mhe_estimator_describe(r->estimator, &r->info);
     status = mhi_recording_read(v->run, mhi_system_description(system), loud, &r->recording, err);
     if (status != MHE_OK) {

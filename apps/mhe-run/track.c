@@ -82,6 +82,7 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         return status;
     }
     const mhi_system *system = mhi_estimator_system(t->estimator);
+    t->summary.info.size = sizeof t->summary.info;
     mhe_estimator_describe(t->estimator, &t->summary.info);
     status =
         mhi_recording_read(s->run, mhi_system_description(system), s->host, &t->recording, err);

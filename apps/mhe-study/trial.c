@@ -32,6 +32,7 @@ static mhe_status open_all(tracking *t, const mhi_noise *noise, const mhe_host *
     if (status != MHE_OK) {
         return status;
     }
+    t->info.size = sizeof t->info;
     mhe_estimator_describe(t->estimator, &t->info);
     mhi_estimator_set_start(t->estimator, t->recording->reference.q, t->recording->reference.qdot);
     return mhi_errors_create(mhi_estimator_system(t->estimator), t->recording, &t->errors, err);

@@ -71,7 +71,7 @@ static void count(const char *formulation, const char *preset, int threads, int3
                            .time = k / r->rate,
                            .markers = r->markers + at * 3 * d->n_markers,
                            .emg = r->emg + at * d->n_muscles};
-        mhe_estimate estimate;
+        mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
         spoil(result->n_estimates, &frame, far, 3 * d->n_markers);
         const uint64_t before = mhi_allocations_of_all();

@@ -64,7 +64,7 @@ static double error_of(const rig *r, const mhe_estimate *e) {
 static void no_markers_in_the_first_second(void **state) {
     (void)state;
     rig r;
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0, n = 0;
     double most = 0;
     rig_open(&r);
@@ -85,7 +85,7 @@ static void no_markers_in_the_first_second(void **state) {
 static void no_markers_at_all(void **state) {
     (void)state;
     rig r;
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0;
     rig_open(&r);
     for (int32_t k = 0; k < 50; k++) {
@@ -99,7 +99,7 @@ static void no_markers_at_all(void **state) {
 static void frames_in_ms(void **state) {
     (void)state;
     rig r;
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0;
     rig_open(&r);
     for (int32_t k = 0; k < 20; k++) {
@@ -113,7 +113,7 @@ static void frames_in_ms(void **state) {
 static void long_gaps_in_the_first_window(void **state) {
     (void)state;
     rig r;
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0;
     rig_open(&r);
     for (int32_t k = 0; k < 40; k++) {
@@ -121,7 +121,7 @@ static void long_gaps_in_the_first_window(void **state) {
         assert_int_equal(push(&r, k, late + r.recording->time[k], 0, &e, &ready), MHE_OK);
         assert_int_equal(ready, k >= 5 + N);
     }
-    mhe_estimator_info info;
+    mhe_estimator_info info = {.size = sizeof info};
     mhe_estimator_describe(r.f.estimator, &info);
     assert_float_equal(info.interval, 0.01, 1e-9);
     rig_close(&r);
@@ -131,7 +131,7 @@ static void told_to_stop(void **state) {
     (void)state;
     static atomic_int stop;
     rig r;
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0;
     rig_open(&r);
     mhi_estimator_set_stop(r.f.estimator, &stop);

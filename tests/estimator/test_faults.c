@@ -95,7 +95,7 @@ static void run(rig *r, fault harm, outcome *o) {
         }
         const mhe_frame frame = {
             .size = sizeof frame, .time = told[k], .markers = markers, .emg = emg};
-        mhe_estimate e;
+        mhe_estimate e = {.size = sizeof e};
         int32_t ready = 0;
         assert_int_equal(mhe_estimator_push(r->f.estimator, &frame, &e, &ready, &r->f.err), MHE_OK);
         int32_t at = k; /* the newest frame that was told this time */

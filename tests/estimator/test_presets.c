@@ -39,7 +39,7 @@ static void track(const char *cost, const char *preset, mhi_rmse *rmse) {
     mhi_estimator_set_start(f.estimator, r->reference.q, r->reference.qdot);
     for (int32_t k = 0; k < r->n_frames; k++) {
         const mhe_frame frame = mhi_recording_frame(r, d->n_markers, d->n_muscles, k);
-        mhe_estimate estimate;
+        mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
         assert_int_equal(mhe_estimator_push(f.estimator, &frame, &estimate, &ready, &f.err),
                          MHE_OK);

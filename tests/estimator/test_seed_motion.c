@@ -60,7 +60,7 @@ static void track(const char *cost, const char *formulation, int ratio, result *
                                  .time = r->time[k],
                                  .markers = markers + k * 3 * d->n_markers,
                                  .emg = r->emg + k * d->n_muscles};
-        mhe_estimate estimate;
+        mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
         assert_int_equal(mhe_estimator_push(f.estimator, &frame, &estimate, &ready, &f.err),
                          MHE_OK);

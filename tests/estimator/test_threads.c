@@ -55,7 +55,7 @@ static void follow(const char *preset, int threads, trace *t) {
                                  .time = r->time[k],
                                  .markers = r->markers + k * 3 * d->n_markers,
                                  .emg = r->emg + k * d->n_muscles};
-        mhe_estimate e;
+        mhe_estimate e = {.size = sizeof e};
         int32_t ready = 0;
         assert_int_equal(mhe_estimator_push(f.estimator, &frame, &e, &ready, &f.err), MHE_OK);
         if (ready) {

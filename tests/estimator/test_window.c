@@ -55,7 +55,7 @@ static void estimates_belong_to_the_oldest_frame(void **state) {
     (void)state;
     held h;
     open_held(&h);
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     for (int32_t k = 0; k < 20; k++) {
         int32_t ready = 0;
         assert_int_equal(push(&h, 5 + 0.01 * k, h.markers, &e, &ready), MHE_OK);
@@ -78,7 +78,7 @@ static void gaps_are_bridged(void **state) {
     (void)state;
     held h;
     open_held(&h);
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     double partial[3 * N_K];
     for (int32_t k = 0; k < 60; k++) {
         for (int32_t i = 0; i < 3 * N_K; i++) {
@@ -102,7 +102,7 @@ static void time_must_increase(void **state) {
     (void)state;
     held h;
     open_held(&h);
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0;
     assert_int_equal(push(&h, 1, h.markers, &e, &ready), MHE_OK);
     assert_int_equal(push(&h, 1, h.markers, &e, &ready), MHE_E_ARGUMENT);
@@ -115,7 +115,7 @@ static void markers_in_millimetres_are_refused(void **state) {
     (void)state;
     held h;
     open_held(&h);
-    mhe_estimate e;
+    mhe_estimate e = {.size = sizeof e};
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < 3 * N_K; i++) {
         h.markers[i] *= 1000;
@@ -134,7 +134,7 @@ static void after_a_refusal_frames_go_on(void **state) {
     (void)state;
     held h;
     open_held(&h);
-    mhe_estimate e = {0};
+    mhe_estimate e = {.size = sizeof e};
     double far[3 * N_K];
     int32_t n_refused = 0, n_ready = 0;
     for (int32_t i = 0; i < 3 * N_K; i++) {
@@ -165,7 +165,7 @@ static void start_without_velocity_is_free_to_move(void **state) {
                               "costs: [mhe.cost.min-excitation]\n") != MHE_OK) {
         fail_msg("%s", f.err.text);
     }
-    mhe_estimate e = {0};
+    mhe_estimate e = {.size = sizeof e};
     int32_t ready = 0;
     for (int32_t k = 0; k <= 5; k++) {
         const mhe_frame frame = {.size = sizeof frame, .time = 0.01 * k, .markers = markers};

@@ -29,6 +29,16 @@
  * A config file may come from anywhere, and a plugin is code: a `plugin_path` in the file is
  * refused. An application that trusts a folder names it itself, by `set` or in MHE_PLUGIN_PATH.
  *
+ * What is measured are channels, rows of a table (mhe_estimator_info.channels): each has a name, a
+ * width, units, labels, and the signal of the model that its values are the target of. A
+ * measurement comes with a frame, or alone with a time of its own (mhe_estimator_measure): it then
+ * belongs to the node of that time while that is in the window, be it late or early. So packets of
+ * EMG may come tens of milliseconds after their frames and none is lost.
+ *
+ * Structs begin with their size, which the caller sets to sizeof: nothing is read or written beyond
+ * it, so that programs built with an older header go on. Arrays of structs have a stride. A NULL
+ * where a pointer is needed, or a size too small to hold anything, is MHE_E_ARGUMENT.
+ *
  * Threads: one estimator belongs to one thread at a time; several estimators are independent. */
 #ifndef MHE_ESTIMATOR_H
 #define MHE_ESTIMATOR_H
@@ -40,6 +50,78 @@ extern "C" {
 #endif
 
 typedef struct mhe_estimator mhe_estimator;
+
+/* ---- channels ---- */
+
+#define MHE_CHANNEL_TARGET 0 /* costs compare a signal of the model with it */
+#define MHE_CHANNEL_INPUT 1  /* the dynamics read it: input block of the same name */
+
+/* What a channel whose samples come on their own is worth at a node between two of them, or after
+ * the newest. Samples further apart (HOLD, NEAREST: away) than the channel's `gap` leave nodes
+ * without. A sample within half a microsecond of a node is taken as it is. */
+#define MHE_GAP_HOLD 0    /* the newest sample at or before the node */
+#define MHE_GAP_LINEAR 1  /* linear between the samples beside it */
+#define MHE_GAP_NEAREST 2 /* the sample nearest to it */
+
+/* One row of the table. Strings and arrays live as long as the estimator. */
+typedef struct mhe_channel {
+    uint32_t size;
+    int32_t kind;       /* MHE_CHANNEL_* */
+    const char *name;   /* "markers", "emg", "angles" */
+    const char *signal; /* of the model (mhe/cost.h) that it is the target of; NULL: an input */
+    int32_t width;      /* numbers in a measurement: n_labels x per_label */
+    int32_t n_labels, per_label;
+    const char *const *labels;  /* [n_labels] of markers, muscles, coordinates */
+    const char *const *columns; /* [width], "WRIST.x" where there are several a label */
+    const char *const *units;   /* [width] */
+    int32_t gap_rule;           /* MHE_GAP_* */
+    double gap;                 /* s; 0 before the interval is known */
+    double delay;               /* s by which a node's value is older than the node: data.emg_delay
+                                 * frames; 0 before the interval is known */
+    double sigma;               /* standard deviation, in its unit; 0: the costs alone weigh it */
+} mhe_channel;
+
+/* What became of a channel's measurements so far. */
+typedef struct mhe_channel_counts {
+    uint32_t size;
+    int64_t n_with_frames; /* frames that came with it */
+    int64_t n_alone;       /* samples of mhe_estimator_measure that were in time */
+    int64_t n_dropped;     /* samples before the window's nodes: too late */
+    int64_t n_late_nodes;  /* nodes that were in a solve without it and got it afterwards */
+    int64_t n_nodes;       /* nodes that have left the window */
+    int64_t n_empty;       /* of these without any value of it */
+} mhe_channel_counts;
+
+/* How an entry of a channel is tracked at a node. */
+#define MHE_TRACK_USED 0
+#define MHE_TRACK_MISSING 1   /* it was not measured */
+#define MHE_TRACK_FAR 2       /* a marker too far from where it is expected: data.marker_outlier */
+#define MHE_TRACK_SATURATED 3 /* EMG at the ends of its range: data.emg_saturation */
+#define MHE_TRACK_UNREAD 4    /* no cost reads the signal */
+
+/* A channel at the node that an estimate is of. */
+typedef struct mhe_tracked {
+    uint32_t size;
+    int32_t channel;         /* its place in the table */
+    int32_t n_measured;      /* entries */
+    int32_t n_left_out;      /* of these not believed */
+    const double *measured;  /* [width], NaN: missing */
+    const double *target;    /* [width] what the costs were given; NaN: nothing */
+    const double *weight;    /* [width] factor on what the costs weigh: 1 tracked, 0 left out */
+    const int32_t *why;      /* [width] MHE_TRACK_* */
+    const double *estimated; /* [width] the signal in the estimate */
+    double rms;              /* of estimated - measured: a label's distance where it has several
+                              * entries; NaN: nothing was measured */
+} mhe_tracked;
+
+/* ---- estimator ---- */
+
+/* How far the window is. */
+#define MHE_PHASE_EMPTY 0     /* no frame since the start, or since the stream broke off */
+#define MHE_PHASE_FILLING 1   /* fewer frames than nodes */
+#define MHE_PHASE_BEGINNING 2 /* full, but nothing yet to begin from: no posture was measured */
+#define MHE_PHASE_SETTLING 3  /* solved with its first state free */
+#define MHE_PHASE_RUNNING 4   /* the first state is known and fixed */
 
 /* Sizes and names, constant over the estimator's life. Names live as long as it. */
 typedef struct mhe_estimator_info {
@@ -56,7 +138,17 @@ typedef struct mhe_estimator_info {
     const char *config_name;
     int32_t node; /* of the estimates: 0 the window's oldest frame, `window` the newest */
     double delay; /* s from that node to the newest frame: (window - node) * interval */
+    int32_t n_channels;
+    uint32_t channel_size;       /* stride of `channels` */
+    const mhe_channel *channels; /* delay and gap follow the interval */
+    int32_t phase;               /* MHE_PHASE_*, at the moment */
 } mhe_estimator_info;
+
+/* Row i of the table. [any] */
+static inline const mhe_channel *mhe_channel_at(const mhe_estimator_info *info, int32_t i) {
+    return (const mhe_channel *)(const void *)((const char *)info->channels +
+                                               (size_t)i * info->channel_size);
+}
 
 /* One measurement. Missing values are NaN; a NULL array is all missing. Lent for the call. */
 typedef struct mhe_frame {
@@ -65,6 +157,10 @@ typedef struct mhe_frame {
     const double *markers; /* [n_markers x 3], m, ground frame */
     const double *emg;     /* [n_muscles], normalised 0..1 */
     const double *angles;  /* [n_q], measured coordinates, rad (m): target of the signal `q` */
+    /* Or by channel: entry i is the measurement [width] of row i of the table. Goes before the
+     * three fields above, which are short for the rows "markers", "emg", "angles". */
+    int32_t n_channels;
+    const double *const *channels; /* [n_channels]; may be NULL */
 } mhe_frame;
 
 /* How a frame's estimate came about. */
@@ -95,7 +191,18 @@ typedef struct mhe_estimate {
     const double *markers;    /* [n_markers x 3], m */
     double latency;           /* s from the call of push to the estimate */
     double evaluation_time;   /* s of it spent on costs, dynamics and their derivatives */
+    int32_t phase;            /* MHE_PHASE_*: settling or running */
+    int32_t n_tracked;
+    uint32_t tracked_size;      /* stride of `tracked` */
+    const mhe_tracked *tracked; /* [n_tracked] what of each channel this node tracked. Of a control
+                                 * at the last node, which has none: what the one before it did */
 } mhe_estimate;
+
+/* What a channel tracked. [any] */
+static inline const mhe_tracked *mhe_tracked_at(const mhe_estimate *estimate, int32_t i) {
+    return (const mhe_tracked *)(const void *)((const char *)estimate->tracked +
+                                               (size_t)i * estimate->tracked_size);
+}
 
 /* On a config (mhe/config.h), which is lent and must live longer; its host gets the messages.
  * Several estimators may be made of one. MHE_E_CONFIG, MHE_E_INPUT, MHE_E_PLUGIN: as below. [cold]
@@ -111,8 +218,22 @@ MHE_API mhe_status mhe_estimator_open(const char *config, const char *const *set
                                       mhe_error *err);
 MHE_API void mhe_estimator_close(mhe_estimator *estimator); /* NULL is fine. [cold] */
 
-/* Fills `info`. [cold] */
-MHE_API void mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
+/* Fills `info` up to its size. [cold] */
+MHE_API mhe_status mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
+/* Row of the table with this name; -1: there is none. [any] */
+MHE_API int32_t mhe_estimator_find_channel(const mhe_estimator *estimator, const char *name);
+/* Fills `counts` of a channel up to its size. [cold] */
+MHE_API mhe_status mhe_estimator_counts(const mhe_estimator *estimator, int32_t channel,
+                                        mhe_channel_counts *counts);
+
+/* A measurement `values` [width] of one channel at its own time: earlier than the newest frame, or
+ * later. It goes to the nodes that its time and the channel's gap rule say, as long as they are in
+ * the window, and counts from the next solve on; what a frame itself brought stays. A time that
+ * came before is replaced. What is too late for the window is dropped and counted, which is no
+ * error. MHE_E_ARGUMENT: no such channel, a time that is not finite. MHE_E_MEMORY: the first sample
+ * of a channel takes memory, none after it does. [cold] */
+MHE_API mhe_status mhe_estimator_measure(mhe_estimator *estimator, int32_t channel, double time,
+                                         const double *values, mhe_error *err);
 
 /* Does what can be done before the next frame comes: shifts the window, linearises it where the
  * solver can. May be called after each push; push does itself what was not done. [cold] */
@@ -121,10 +242,11 @@ MHE_API mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *er
 /* Takes the next frame (time must increase). `*ready` is 1 when `estimate` was filled: from the
  * window's first fill on, at every ratio-th frame; where frames have markers or angles, not before
  * one is measured or the start is known. A bad frame or a failed solve is told by
- * estimate->status. MHE_E_ARGUMENT: time does not increase (or only less than a window back: then
- * the frame is out of order); the frame is not taken. MHE_E_INPUT: no marker of the first window is
- * within a metre of the model, or the frames are half a second or more apart (times in ms?); the
- * window moves on and the next frame is tried. Anything else is a bug. [cold] */
+ * estimate->status. `estimate` is filled up to its size. MHE_E_ARGUMENT: time does not increase (or
+ * only less than a window back: then the frame is out of order); the frame is not taken.
+ * MHE_E_INPUT: no marker of the first window is within a metre of the model, or the frames are half
+ * a second or more apart (times in ms?); the window moves on and the next frame is tried. Anything
+ * else is a bug. [cold] */
 MHE_API mhe_status mhe_estimator_push(mhe_estimator *estimator, const mhe_frame *frame,
                                       mhe_estimate *estimate, int32_t *ready, mhe_error *err);
 

@@ -91,77 +91,44 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
         status = mhi_solver_create(run->solver.plugin, e->host, mhi_ocp_face(e->ocp),
                                    run->solver.config, &e->solver_self, err);
     }
-    if (status == MHE_OK) {
-        status = mhi_start_create(e->system, mhi_ocp_context(e->ocp), &e->start, err);
-    }
     return status;
 }
 
-/* Nothing is known of the first state. */
-void mhi_estimator_forget_start(mhe_estimator *e) {
-    for (int32_t i = 0; i < e->n_q; i++) {
-        e->start_q[i] = e->start_v[i] = NAN;
-    }
-}
+/* The estimator's parts, once its problem is there. */
+static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
+    const mhi_run *run = e->run;
+    const int32_t n = run->horizon.window;
+    const double interval = mhi_ocp_problem(e->ocp)->interval; /* a guess */
+    e->torque_max = MHI_TAKE(&e->arena, double, e->n_q);
 
-static mhe_status take_arrays(mhe_estimator *e, mhe_error *err) {
-    const int32_t nodes = e->n + 1;
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {{&e->times, nodes},
-                  {&e->markers, nodes * 3 * e->n_k},
-                  {&e->trusted, nodes * 3 * e->n_k},
-                  {&e->expected, 3 * e->n_k},
-                  {&e->distance, nodes},
-                  {&e->steps, e->n},
-                  {&e->emg, nodes * e->n_m},
-                  {&e->angles, nodes * e->n_q},
-                  {&e->no_angles, e->n_q},
-                  {&e->delay_line, (e->delay + 1) * e->n_m},
-                  {&e->solution.x, nodes * e->n_x},
-                  {&e->solution.u, e->n * e->n_u},
-                  {&e->solution.lambda, e->n * e->n_x},
-                  {&e->solution.zx_lower, nodes * e->n_x},
-                  {&e->solution.zx_upper, nodes * e->n_x},
-                  {&e->solution.zu_lower, e->n * e->n_u},
-                  {&e->solution.zu_upper, e->n * e->n_u},
-                  {&e->guess_x, nodes * e->n_x},
-                  {&e->guess_u, e->n * e->n_u},
-                  {&e->prior_centre, e->n_x},
-                  {&e->prior_weight, e->n_x},
-                  {&e->start_q, e->n_q},
-                  {&e->start_v, e->n_q},
-                  {&e->torque_max, e->n_q},
-                  {&e->no_markers, 3 * e->n_k},
-                  {&e->no_emg, e->n_m},
-                  {&e->out_q, e->n_q},
-                  {&e->out_v, e->n_q},
-                  {&e->out_activation, e->n_m},
-                  {&e->out_excitation, e->n_m},
-                  {&e->out_force, e->n_m},
-                  {&e->out_moment, e->n_q},
-                  {&e->out_residual, e->n_q},
-                  {&e->out_marker, 3 * e->n_k}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&e->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
+    mhe_status status =
+        e->torque_max == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    if (status == MHE_OK) {
+        status = mhi_window_create(&e->window, n, e->n_x, e->n_u, &e->arena, err);
     }
-    for (int32_t i = 0; i < 3 * e->n_k; i++) {
-        e->no_markers[i] = NAN;
+    if (status == MHE_OK) {
+        status =
+            mhi_channels_create(run, e->ocp, e->description, n + 1, &e->arena, &e->channels, err);
     }
-    for (int32_t i = 0; i < e->n_m; i++) {
-        e->no_emg[i] = NAN;
+    if (status == MHE_OK) {
+        e->given = MHI_TAKE(&e->arena, const double *, e->channels.n);
+        status = e->given == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
     }
-    for (int32_t i = 0; i < e->n_q; i++) {
-        e->no_angles[i] = NAN;
+    if (status == MHE_OK) {
+        status = mhi_frame_clock_create(&e->clock, n, run->horizon.ratio, interval, &e->arena, err);
     }
-    mhi_estimator_forget_start(e);
-    e->solution.size = sizeof e->solution;
-    e->last_time = -INFINITY;
-    return MHE_OK;
+    if (status == MHE_OK) {
+        status = mhi_trust_create(&e->trust, e->n_k, run, &e->arena, err);
+    }
+    if (status == MHE_OK) {
+        status =
+            mhi_begin_create(&e->begin, e->system, mhi_ocp_context(e->ocp), n + 1, &e->arena, err);
+    }
+    if (status == MHE_OK) {
+        status =
+            mhi_output_create(&e->output, e->n_q, e->n_m, e->n_k, &e->channels, &e->arena, err);
+    }
+    return status;
 }
 
 static mhe_status start_from_config(mhe_estimator *e, mhe_error *err) {
@@ -200,12 +167,8 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
     e->host = host;
     e->run = run;
     e->solver = run->solver.plugin->ops;
-    e->n = run->horizon.window;
-    e->delay = run->data.emg_delay;
     e->node = run->output.node;
-    e->outlier = run->data.marker_outlier;
-    e->saturation = run->data.emg_saturation;
-    e->budget = 1e-3 * run->realtime.deadline_ms;
+    e->pace.budget = 1e-3 * run->realtime.deadline_ms;
     mhe_status status = MHE_OK;
     if (description == NULL) {
         status = mhi_estimator_read_model(run, host, &e->owned_description, err);
@@ -223,7 +186,7 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
         e->n_x = f->n_x;
         e->n_u = f->n_u;
         e->n_k = e->description->n_markers;
-        status = take_arrays(e, err);
+        status = create_parts(e, err);
     }
     if (status == MHE_OK) {
         status = start_from_config(e, err);
@@ -254,7 +217,8 @@ void mhe_estimator_close(mhe_estimator *e) {
     if (e == NULL) {
         return;
     }
-    mhi_start_free(e->start);
+    mhi_begin_free(&e->begin);
+    mhi_channels_free(&e->channels);
     if (e->solver_self != NULL) {
         e->solver->destroy(e->solver_self);
     }
@@ -276,15 +240,15 @@ mhi_ocp *mhi_estimator_ocp(mhe_estimator *e) {
 
 void mhi_estimator_set_start(mhe_estimator *e, const double *q, const double *qdot) {
     for (int32_t i = 0; i < e->n_q; i++) {
-        e->start_q[i] = isnan(e->start_q[i]) && q != NULL ? q[i] : e->start_q[i];
-        e->start_v[i] = isnan(e->start_v[i]) && qdot != NULL ? qdot[i] : e->start_v[i];
+        e->begin.q[i] = isnan(e->begin.q[i]) && q != NULL ? q[i] : e->begin.q[i];
+        e->begin.v[i] = isnan(e->begin.v[i]) && qdot != NULL ? qdot[i] : e->begin.v[i];
     }
 }
 
 void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
-    memcpy(e->solution.x, x, sizeof(double) * (size_t)e->n_x);
-    e->settled = 1;
-    e->prepared = 0;
+    memcpy(e->window.solution.x, x, sizeof(double) * (size_t)e->n_x);
+    e->window.prepared = 0;
+    mhi_phase_on(e, MHI_EVENT_SETTLED);
 }
 
 void mhi_estimator_set_node(mhe_estimator *e, int32_t node) {
@@ -292,7 +256,7 @@ void mhi_estimator_set_node(mhe_estimator *e, int32_t node) {
 }
 
 void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {
-    e->budget = seconds;
+    e->pace.budget = seconds;
 }
 
 void mhi_estimator_set_stop(mhe_estimator *e, const atomic_int *stop) {
@@ -301,25 +265,5 @@ void mhi_estimator_set_stop(mhe_estimator *e, const atomic_int *stop) {
 }
 
 void mhi_estimator_set_outlier(mhe_estimator *e, double distance) {
-    e->outlier = distance;
-}
-
-void mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *info) {
-    const mhe_problem *p = mhi_ocp_problem(e->ocp);
-    *info = (mhe_estimator_info){.size = sizeof *info,
-                                 .formulation = p->formulation,
-                                 .n_q = e->n_q,
-                                 .n_muscles = e->n_m,
-                                 .n_markers = e->n_k,
-                                 .n_residual_torques = e->n_r,
-                                 .window = e->n,
-                                 .ratio = e->run->horizon.ratio,
-                                 .interval = p->interval,
-                                 .coordinate_names = p->coordinate_names,
-                                 .muscle_names = p->muscle_names,
-                                 .marker_names = p->marker_names,
-                                 .solver = e->run->solver.plugin->id,
-                                 .config_name = e->run->name,
-                                 .node = e->node,
-                                 .delay = (e->n - e->node) * p->interval};
+    e->trust.outlier = distance;
 }

@@ -1,123 +1,74 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* push.c: frames in, estimates out. */
+#include "base/need.h"
 #include "estimator/estimator_private.h"
 
 #include <stdio.h>
-#include <string.h>
-#include <time.h>
-
-double mhi_now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-/* The EMG that a node at this frame tracks: that of `delay` frames ago, before that the first. */
-static const double *delayed_emg(mhe_estimator *e, const double *emg) {
-    const int32_t slots = e->delay + 1;
-    const int32_t put = (int32_t)(e->n_frames % slots), get = (int32_t)((e->n_frames + 1) % slots);
-    for (int32_t slot = 0; slot < slots; slot++) {
-        if (slot == put || e->n_frames == 0) {
-            memcpy(e->delay_line + slot * e->n_m, emg, sizeof(double) * (size_t)e->n_m);
-        }
-    }
-    return e->delay_line + get * e->n_m;
-}
-
-/* Callers compiled before there were angles have a shorter frame. */
-static const double *measured_angles(const mhe_estimator *e, const mhe_frame *frame) {
-    const int known = frame->size >= offsetof(mhe_frame, angles) + sizeof frame->angles;
-    return known && frame->angles != NULL ? frame->angles : e->no_angles;
-}
-
-/* Everything that is told about a node; the last one has the controls that lead to it. */
-static mhe_status give_estimate(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_error *err) {
-    const int32_t controls = k < e->n ? k : e->n - 1;
-    const double *x = mhi_row(e->solution.x, k, e->n_x);
-    const double *u = mhi_row(e->solution.u, controls, e->n_u);
-    const int driven = e->n_x > 2 * e->n_q;
-    const double *a = driven ? x + 2 * e->n_q : u;
-    const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;
-    memcpy(e->out_q, x, n_q);
-    memcpy(e->out_v, x + e->n_q, n_q);
-    memcpy(e->out_activation, a, n_m);
-    memcpy(e->out_excitation, u, n_m);
-    memcpy(e->out_residual, u + e->n_m, sizeof(double) * (size_t)e->n_r);
-    mhi_muscle_state muscles;
-    mhi_system_context *context = mhi_ocp_context(e->ocp);
-    mhe_status status = mhi_system_muscles(context, x, x + e->n_q, a, 0, &muscles, err);
-    if (status == MHE_OK) {
-        memcpy(e->out_force, muscles.force, n_m);
-        memcpy(e->out_moment, muscles.moment, n_q);
-        status = mhi_system_markers(context, x, e->out_marker, NULL, err);
-    }
-    out->time = e->times[k];
-    out->marker_rms =
-        mhi_rms_distance(e->out_marker, mhi_row(e->markers, k, 3 * e->n_k), 3 * e->n_k, 3);
-    out->emg_rms = mhi_rms_distance(u, mhi_row(e->emg, controls, e->n_m), e->n_m, 1);
-    out->q = e->out_q;
-    out->qdot = e->out_v;
-    out->activation = e->out_activation;
-    out->excitation = driven ? e->out_excitation : NULL;
-    out->force = e->out_force;
-    out->moment = e->out_moment;
-    out->residual = e->out_residual;
-    out->markers = e->out_marker;
-    return status;
-}
 
 mhe_status mhi_estimator_node(mhe_estimator *e, int32_t k, mhe_estimate *estimate, mhe_error *err) {
     *estimate = (mhe_estimate){.size = sizeof *estimate};
-    return give_estimate(e, k - 1, estimate, err); /* the window has moved on since */
+    return mhi_output_give(e, k - 1, estimate, err); /* the window has moved on since */
 }
 
 mhe_status mhe_estimator_prepare(mhe_estimator *e, mhe_error *err) {
-    if (!e->begun || e->prepared || e->filled < e->n) {
-        return MHE_OK;
+    mhe_status status = MHI_NEED(err, {"estimator", e});
+    if (status != MHE_OK || !mhi_phase_begun(e) || e->window.prepared ||
+        e->window.filled < e->window.n) {
+        return status;
     }
     const double begin = mhi_now();
-    mhe_status status = MHE_OK;
     mhi_window_follow(e);
-    if (e->solver->prepare != NULL && e->settled) {
-        status = e->solver->prepare(e->solver_self, &e->solution, err);
+    if (e->solver->prepare != NULL && mhi_phase_settled(e)) {
+        status = e->solver->prepare(e->solver_self, &e->window.solution, err);
     }
-    e->ahead += mhi_now() - begin;
+    e->pace.ahead += mhi_now() - begin;
     return status;
 }
 
-/* From a posture that is known or measured, or where none ever is from the EMG alone: a window
- * whose markers are still hidden would wander anywhere, and take long for it. */
-static int32_t can_begin(const mhe_estimator *e) {
-    int32_t known = !e->has_posture;
-    for (int32_t i = 0; i < e->n_q && !known; i++) {
-        known = !isnan(e->start_q[i]) || !isnan(e->angles[i]);
+/* The grid of nodes, where it is not known: from the times of a full window. `*known` 0: there is a
+ * gap, and what lies before it is dropped. */
+static mhe_status find_interval(mhe_estimator *e, int32_t *known, mhe_error *err) {
+    int32_t gap = 0;
+    if (e->clock.interval > 0) {
+        return MHE_OK;
     }
-    for (int32_t i = 0; i < 3 * e->n_k && !known; i++) {
-        known = !isnan(e->markers[i]);
+    const mhe_status status = mhi_frame_clock_measure(&e->clock, e->window.times, &gap, err);
+    for (int32_t k = 0; k < gap; k++) {
+        mhi_window_advance(e);
     }
-    return known;
+    *known = status == MHE_OK && gap == 0;
+    if (*known) {
+        mhi_ocp_set_interval(e->ocp, e->clock.interval);
+        mhi_channels_set_interval(&e->channels, e->clock.interval, e->clock.ratio);
+    }
+    return status;
+}
+
+static void look_for_late(mhe_estimator *e) {
+    mhi_channels_look(&e->channels, e->window.times, e->window.filled, mhi_trust_late, e);
 }
 
 /* The first window from its measurements, once there is a posture in its oldest frame. */
 static mhe_status begin_window(mhe_estimator *e, int32_t *known, mhe_error *err) {
-    mhe_status status = e->interval > 0 ? MHE_OK : mhi_clock_measure(e, known, err);
+    mhe_status status = find_interval(e, known, err);
     if (status != MHE_OK || !*known) {
         return status;
     }
-    if (!can_begin(e)) {
-        e->waited++;
+    look_for_late(e);
+    if (!mhi_begin_can(e)) {
+        e->begin.waited++;
         *known = 0;
         mhi_window_advance(e);
         return MHE_OK;
     }
-    if (e->waited > 0) {
+    if (e->begin.waited > 0) {
         char line[160];
         (void)snprintf(line, sizeof line,
                        "no posture was measured in the %d frames before %.6g s: estimates begin "
                        "there",
-                       (int)e->waited, e->times[0]);
+                       (int)e->begin.waited, e->window.times[0]);
         e->host->log(e->host, MHE_LOG_WARNING, line);
-        e->waited = 0;
+        e->begin.waited = 0;
     }
     return mhi_window_begin(e, err);
 }
@@ -126,10 +77,11 @@ static mhe_status begin_window(mhe_estimator *e, int32_t *known, mhe_error *err)
 static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err) {
     mhe_status status = MHE_OK;
     *known = 1;
-    if (e->begun) {
+    if (mhi_phase_begun(e)) {
         mhi_window_follow(e);
-        mhi_recover_screen(e);
-        if (mhi_recover_is_lost(e)) {
+        look_for_late(e);
+        mhi_trust_screen(e);
+        if (mhi_trust_is_lost(e)) {
             (void)mhi_window_begin(e, NULL); /* where it cannot, the old start goes on */
         }
     } else {
@@ -141,51 +93,100 @@ static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err)
     return status;
 }
 
-mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_estimate *estimate,
-                              int32_t *ready, mhe_error *err) {
-    int32_t used = 0, known = 0;
-    *ready = 0;
-    e->arrival = mhi_now();
-    mhe_status status = mhi_clock_take(e, frame->time, &used, err);
+/* The frame's place: nodes that no frame came for are put in before it. */
+static mhe_status find_node(mhe_estimator *e, double time, int32_t *used, mhe_error *err) {
+    mhi_tick tick;
+    const mhe_status status = mhi_frame_clock_take(&e->clock, time, &tick, err);
     if (status != MHE_OK) {
         return status;
     }
-    const double *emg = delayed_emg(e, frame->emg == NULL ? e->no_emg : frame->emg);
-    e->n_frames++;
-    e->has_posture |= frame->markers != NULL || measured_angles(e, frame) != e->no_angles;
-    mhi_recover_count_emg(e, emg);
+    if (tick.emptied) {
+        mhi_window_clear(e);
+    }
+    for (int32_t i = 0; i < e->channels.n && tick.set_back; i++) {
+        mhi_samples_clear(&e->channels.rows[i].samples);
+    }
+    for (int32_t i = 1; i <= tick.missing; i++) {
+        mhi_window_skip(e, tick.before + i * e->clock.interval);
+    }
+    *used = tick.used;
+    return MHE_OK;
+}
+
+/* A frame's measurements, to the newest node where the frame is one. */
+static void take_frame(mhe_estimator *e, const mhe_frame *frame, int32_t used) {
+    const mhi_channels *channels = &e->channels;
+    for (int32_t i = 0; i < channels->n; i++) {
+        mhi_channel *c = &channels->rows[i];
+        const double *values = mhi_channels_of_frame(channels, i, frame);
+        e->begin.has_posture |= c->posture && values != c->absent;
+        c->counts.n_with_frames += mhi_channel_any(values, c->face.width);
+        e->given[i] = mhi_channel_delayed(channels, i, values);
+        mhi_trust_count(&e->trust, c, e->given[i]);
+    }
+    e->channels.n_frames++;
     if (!used) {
-        return MHE_OK;
+        return;
     }
-    mhi_window_append(e, frame->time, frame->markers == NULL ? e->no_markers : frame->markers, emg,
-                      measured_angles(e, frame));
-    mhi_recover_drop_emg(e);
-    if (e->filled <= e->n) {
-        return MHE_OK;
+    mhi_window_append(e, frame->time, e->given);
+    for (int32_t i = 0; i < channels->n; i++) {
+        mhi_trust_drop(&e->trust, &channels->rows[i], e->window.filled - 1);
     }
+}
+
+/* The full window's estimate. `*ready` 0: it cannot be solved yet. */
+static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t *ready,
+                               mhe_error *err) {
     mhe_solve_info info = {.size = sizeof info};
-    *estimate = (mhe_estimate){.size = sizeof *estimate};
-    status = start_window(e, &known, err);
-    if (status == MHE_OK && !known) {
+    mhe_status status = start_window(e, ready, err);
+    if (status == MHE_OK && !*ready) {
         return MHE_OK;
     }
     if (status == MHE_OK) {
         status = mhi_window_solve(e, &info, &estimate->status, err);
     }
     if (status == MHE_OK) {
-        mhi_recover_solved(e, estimate->status);
-        status = give_estimate(e, e->node, estimate, err);
-        estimate->latency = mhi_now() - e->arrival;
-        estimate->solve_time = estimate->latency + e->ahead;
+        mhi_trust_solved(e, estimate->status);
+        status = mhi_output_give(e, e->node, estimate, err);
+        estimate->latency = mhi_now() - e->pace.arrival;
+        estimate->solve_time = estimate->latency + e->pace.ahead;
+        estimate->iterations = info.iterations;
+        estimate->kkt_residual = info.kkt_residual;
+        estimate->evaluation_time = info.evaluation_time;
     }
-    e->ahead = 0;
+    e->pace.ahead = 0;
     mhi_window_advance(e); /* in any case: the next frame needs its place */
+    *ready = status == MHE_OK;
+    return status;
+}
+
+mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_estimate *estimate,
+                              int32_t *ready, mhe_error *err) {
+    int32_t used = 0;
+    mhe_frame ours;
+    mhe_estimate made = {.size = sizeof made};
+    mhe_status status =
+        MHI_NEED(err, {"estimator", e}, {"frame", frame}, {"estimate", estimate}, {"ready", ready});
+    if (status == MHE_OK) {
+        *ready = 0;
+        status = mhi_take(__func__, &ours, sizeof ours, frame, err);
+    }
+    if (status == MHE_OK && estimate->size < sizeof estimate->size) {
+        status =
+            mhe_fail(err, MHE_E_ARGUMENT, "mhe_estimator_push: the estimate's size is not set");
+    }
     if (status != MHE_OK) {
         return status;
     }
-    estimate->iterations = info.iterations;
-    estimate->kkt_residual = info.kkt_residual;
-    estimate->evaluation_time = info.evaluation_time;
-    *ready = 1;
-    return MHE_OK;
+    e->pace.arrival = mhi_now();
+    status = find_node(e, ours.time, &used, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    take_frame(e, &ours, used);
+    if (!used || e->window.filled <= e->window.n) {
+        return MHE_OK;
+    }
+    status = solve_window(e, &made, ready, err);
+    return *ready ? mhi_give(__func__, estimate, &made, err) : status;
 }

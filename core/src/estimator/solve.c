@@ -25,51 +25,55 @@ static int all_finite(const double *values, ptrdiff_t n) {
 }
 
 static void take_back_guess(mhe_estimator *e) {
-    memcpy(e->solution.x, e->guess_x, sizeof(double) * (size_t)(e->n + 1) * (size_t)e->n_x);
-    memcpy(e->solution.u, e->guess_u, sizeof(double) * (size_t)e->n * (size_t)e->n_u);
-    e->solution.has_multipliers = 0;
+    memcpy(e->window.solution.x, e->window.guess_x,
+           sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->n_x);
+    memcpy(e->window.solution.u, e->window.guess_u,
+           sizeof(double) * (size_t)e->window.n * (size_t)e->n_u);
+    e->window.solution.has_multipliers = 0;
 }
 
 /* The model's own prediction from the first state under the guessed controls. */
 static void predict(mhe_estimator *e) {
     take_back_guess(e);
-    for (int32_t k = 0; k < e->n; k++) {
-        double *next = mhi_row(e->solution.x, k + 1, e->n_x);
-        mhe_status status = mhi_ocp_predict(e->ocp, mhi_row(e->solution.x, k, e->n_x),
-                                            mhi_row(e->solution.u, k, e->n_u), next, NULL);
+    for (int32_t k = 0; k < e->window.n; k++) {
+        double *next = mhi_row(e->window.solution.x, k + 1, e->n_x);
+        mhe_status status = mhi_ocp_predict(e->ocp, mhi_row(e->window.solution.x, k, e->n_x),
+                                            mhi_row(e->window.solution.u, k, e->n_u), next, NULL);
         if (status != MHE_OK || !all_finite(next, e->n_x)) {
-            memcpy(next, mhi_row(e->guess_x, k + 1, e->n_x), sizeof(double) * (size_t)e->n_x);
+            memcpy(next, mhi_row(e->window.guess_x, k + 1, e->n_x),
+                   sizeof(double) * (size_t)e->n_x);
         }
     }
 }
 
 static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
-    const mhe_solve_control control = {.size = sizeof control, .deadline = e->arrival + e->budget};
+    const mhe_solve_control control = {.size = sizeof control,
+                                       .deadline = e->pace.arrival + e->pace.budget};
     *info = (mhe_solve_info){.size = sizeof *info};
-    return e->solver->solve(e->solver_self, e->budget > 0 ? &control : NULL, &e->solution, info,
-                            err);
+    return e->solver->solve(e->solver_self, e->pace.budget > 0 ? &control : NULL,
+                            &e->window.solution, info, err);
 }
 
 static int32_t out_of_time(const mhe_estimator *e) {
-    return e->budget > 0 && mhi_now() >= e->arrival + e->budget;
+    return e->pace.budget > 0 && mhi_now() >= e->pace.arrival + e->pace.budget;
 }
 
 /* Largest change of a velocity or activation of the first state. */
 static double first_state_move(const mhe_estimator *e, const double *before) {
     double move = 0;
     for (int32_t i = e->n_q; i < e->n_x; i++) {
-        move = fmax(move, fabs(e->solution.x[i] - before[i]));
+        move = fmax(move, fabs(e->window.solution.x[i] - before[i]));
     }
     return move;
 }
 
 static void set_proximal_weight(mhe_estimator *e, double factor) {
     for (int32_t i = e->n_q; i < e->n_x; i++) {
-        e->prior_weight[i] = factor == 0      ? 0
-                             : e->rounds == 0 ? FIRST_WEIGHT
-                                              : factor * e->prior_weight[i];
+        e->window.prior_weight[i] = factor == 0            ? 0
+                                    : e->begin.rounds == 0 ? FIRST_WEIGHT
+                                                           : factor * e->window.prior_weight[i];
     }
-    mhi_ocp_set_prior(e->ocp, e->prior_centre, e->prior_weight);
+    mhi_ocp_set_prior(e->ocp, e->window.prior_centre, e->window.prior_weight);
 }
 
 /* With its first state free the window hardly determines the first activations: full Gauss-Newton
@@ -81,24 +85,26 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
     mhe_status status = MHE_OK;
     int32_t iterations = 0, cut = 0;
     double factor = 1, evaluation_time = 0;
-    while (!e->settled && !cut && status == MHE_OK) {
-        memcpy(e->prior_centre, e->solution.x, sizeof(double) * (size_t)e->n_x);
+    while (!mhi_phase_settled(e) && !cut && status == MHE_OK) {
+        memcpy(e->window.prior_centre, e->window.solution.x, sizeof(double) * (size_t)e->n_x);
         set_proximal_weight(e, factor);
         status = solve_once(e, info, err);
         iterations += info->iterations;
         evaluation_time += info->evaluation_time;
         const int32_t converged = status == MHE_OK && info->outcome == MHE_SOLVE_CONVERGED;
         const int32_t over = status == MHE_OK && info->outcome == MHE_SOLVE_DEADLINE;
-        e->rounds += !over;
+        e->begin.rounds += !over;
         factor = converged || over ? 1 : 10;
-        e->settled = (converged && first_state_move(e, e->prior_centre) < FIRST_MOVE) ||
-                     e->rounds >= FIRST_SOLVES || status != MHE_OK;
+        if ((converged && first_state_move(e, e->window.prior_centre) < FIRST_MOVE) ||
+            e->begin.rounds >= FIRST_SOLVES || status != MHE_OK) {
+            mhi_phase_on(e, MHI_EVENT_SETTLED);
+        }
         cut = over || out_of_time(e);
     }
-    if (cut && !e->settled && info->outcome == MHE_SOLVE_CONVERGED) {
+    if (cut && !mhi_phase_settled(e) && info->outcome == MHE_SOLVE_CONVERGED) {
         info->outcome = MHE_SOLVE_DEADLINE; /* of what is not yet the last round */
     }
-    if (e->settled) {
+    if (mhi_phase_settled(e)) {
         set_proximal_weight(e, 0);
     }
     info->iterations = iterations;
@@ -112,7 +118,7 @@ static void tell_failure(mhe_estimator *e, const char *why) {
     if (!e->failure_told) {
         char line[MHE_ERROR_TEXT + 64];
         (void)snprintf(line, sizeof line, "%s: from %g s on: %s", e->run->solver.plugin->id,
-                       e->times[0], why);
+                       e->window.times[0], why);
         e->host->log(e->host, MHE_LOG_WARNING, line);
         e->failure_told = 1;
     }
@@ -121,11 +127,11 @@ static void tell_failure(mhe_estimator *e, const char *why) {
 static int32_t status_of(const mhe_estimator *e, int32_t outcome) {
     switch (outcome) {
     case MHE_SOLVE_CONVERGED:
-        return e->restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_OK;
+        return e->begin.restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_OK;
     case MHE_SOLVE_ITERATION_LIMIT:
-        return e->restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_ITERATION_LIMIT;
+        return e->begin.restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_ITERATION_LIMIT;
     case MHE_SOLVE_DEADLINE:
-        return e->restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_DEADLINE;
+        return e->begin.restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_DEADLINE;
     default:
         return MHE_FRAME_PREDICTED;
     }
@@ -134,27 +140,29 @@ static int32_t status_of(const mhe_estimator *e, int32_t outcome) {
 mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,
                             mhe_error *err) {
     mhe_error why = {0};
-    memcpy(e->guess_x, e->solution.x, sizeof(double) * (size_t)(e->n + 1) * (size_t)e->n_x);
-    memcpy(e->guess_u, e->solution.u, sizeof(double) * (size_t)e->n * (size_t)e->n_u);
-    const mhe_status status = (e->settled ? solve_once : settle)(e, info, &why);
+    memcpy(e->window.guess_x, e->window.solution.x,
+           sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->n_x);
+    memcpy(e->window.guess_u, e->window.solution.u,
+           sizeof(double) * (size_t)e->window.n * (size_t)e->n_u);
+    const mhe_status status = (mhi_phase_settled(e) ? solve_once : settle)(e, info, &why);
     if (e->stop != NULL && atomic_load_explicit(e->stop, memory_order_relaxed)) {
         return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted");
     }
     if (status != MHE_OK) {
         tell_failure(e, why.text);
     }
-    const int finite = all_finite(e->solution.x, (ptrdiff_t)(e->n + 1) * e->n_x) &&
-                       all_finite(e->solution.u, (ptrdiff_t)e->n * e->n_u);
+    const int finite = all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->n_x) &&
+                       all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);
     const int begun = info->iterations > 0 || info->outcome == MHE_SOLVE_CONVERGED;
     const int usable = status == MHE_OK && finite && begun && info->primal_residual <= CONSISTENT;
     *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;
     if (*frame_status != MHE_FRAME_PREDICTED) {
-        e->restarted = 0;
-    } else if (e->settled) {
+        e->begin.restarted = 0;
+    } else if (mhi_phase_settled(e)) {
         predict(e);
     } else if (!finite) { /* else what was reached in the time starts the next frame's solve */
         take_back_guess(e);
     }
-    e->solved++;
+    e->window.solved++;
     return MHE_OK;
 }

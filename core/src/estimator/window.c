@@ -1,25 +1,49 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* window.c: the moving window: measurements, targets, bounds, and the shift that starts the next
- * solve (Algorithm 1 of Bailly et al. 2021). */
 #include "estimator/estimator_private.h"
 
 #include <string.h>
 
-void mhi_window_append(mhe_estimator *e, double time, const double *markers, const double *emg,
-                       const double *angles) {
-    const int32_t k = e->filled++;
-    const size_t bytes = sizeof(double) * (size_t)(3 * e->n_k);
-    e->times[k] = time;
-    memcpy(mhi_row(e->markers, k, 3 * e->n_k), markers, bytes);
-    memcpy(mhi_row(e->trusted, k, 3 * e->n_k), markers, bytes);
-    memcpy(mhi_row(e->emg, k, e->n_m), emg, sizeof(double) * (size_t)e->n_m);
-    memcpy(mhi_row(e->angles, k, e->n_q), angles, sizeof(double) * (size_t)e->n_q);
+mhe_status mhi_window_create(mhi_window *w, int32_t n, int32_t n_x, int32_t n_u, mhi_arena *arena,
+                             mhe_error *err) {
+    *w = (mhi_window){.n = n, .n_x = n_x, .n_u = n_u, .solution = {.size = sizeof w->solution}};
+    struct {
+        double **array;
+        int32_t n;
+    } wanted[] = {{&w->times, n + 1},
+                  {&w->solution.x, (n + 1) * n_x},
+                  {&w->solution.u, n * n_u},
+                  {&w->solution.lambda, n * n_x},
+                  {&w->solution.zx_lower, (n + 1) * n_x},
+                  {&w->solution.zx_upper, (n + 1) * n_x},
+                  {&w->solution.zu_lower, n * n_u},
+                  {&w->solution.zu_upper, n * n_u},
+                  {&w->guess_x, (n + 1) * n_x},
+                  {&w->guess_u, n * n_u},
+                  {&w->prior_centre, n_x},
+                  {&w->prior_weight, n_x}};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
+        *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
+        if (*wanted[i].array == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+    }
+    return MHE_OK;
+}
+
+void mhi_window_append(mhe_estimator *e, double time, const double *const *values) {
+    const int32_t k = e->window.filled++;
+    e->window.times[k] = time;
+    for (int32_t i = 0; i < e->channels.n; i++) {
+        mhi_channel *c = &e->channels.rows[i];
+        mhi_channel_set(c, k, values == NULL ? c->absent : values[i]);
+    }
+    mhi_phase_on(e, MHI_EVENT_NODES);
 }
 
 void mhi_window_skip(mhe_estimator *e, double time) {
-    mhi_window_append(e, time, e->no_markers, e->no_emg, e->no_angles);
-    if (e->filled > e->n) {
-        if (e->begun) {
+    mhi_window_append(e, time, NULL);
+    if (e->window.filled > e->window.n) {
+        if (mhi_phase_begun(e)) {
             mhi_window_follow(e);
         }
         mhi_window_advance(e);
@@ -27,11 +51,10 @@ void mhi_window_skip(mhe_estimator *e, double time) {
 }
 
 void mhi_window_clear(mhe_estimator *e) {
-    e->filled = e->n_counted = 0;
-    e->interval = 0;
-    e->begun = e->settled = e->prepared = 0;
-    e->implausible = e->predicted = e->railed = 0;
-    mhi_estimator_forget_start(e);
+    e->window.filled = e->window.prepared = 0;
+    mhi_trust_clear(&e->trust);
+    mhi_begin_forget(&e->begin);
+    mhi_phase_on(e, MHI_EVENT_EMPTIED);
 }
 
 /* Drops the first of n rows of an array, keeping the last one twice. */
@@ -45,7 +68,7 @@ static void set_general_bounds(mhe_estimator *e) {
     const int32_t n_a = e->n_x - 2 * e->n_q;
     const double low = n_a > 0 ? b->excitation_min : b->activation_min;
     const double high = n_a > 0 ? b->excitation_max : b->activation_max;
-    for (int32_t k = 0; k <= e->n; k++) {
+    for (int32_t k = 0; k <= e->window.n; k++) {
         double *lower = mhi_ocp_x_lower(e->ocp, k), *upper = mhi_ocp_x_upper(e->ocp, k);
         for (int32_t i = 0; i < e->n_q; i++) {
             lower[i] = e->description->coordinates[i].lower;
@@ -57,7 +80,7 @@ static void set_general_bounds(mhe_estimator *e) {
             lower[2 * e->n_q + i] = b->activation_min;
             upper[2 * e->n_q + i] = b->activation_max;
         }
-        for (int32_t i = 0; i < e->n_u && k < e->n; i++) {
+        for (int32_t i = 0; i < e->n_u && k < e->window.n; i++) {
             mhi_ocp_u_lower(e->ocp, k)[i] = i < e->n_m ? low : -e->torque_max[i - e->n_m];
             mhi_ocp_u_upper(e->ocp, k)[i] = i < e->n_m ? high : e->torque_max[i - e->n_m];
         }
@@ -67,74 +90,64 @@ static void set_general_bounds(mhe_estimator *e) {
 void mhi_window_set_bounds(mhe_estimator *e) {
     const size_t bytes = sizeof(double) * (size_t)e->n_x;
     set_general_bounds(e);
-    if (e->settled) {
-        memcpy(mhi_ocp_x_lower(e->ocp, 0), e->solution.x, bytes);
-        memcpy(mhi_ocp_x_upper(e->ocp, 0), e->solution.x, bytes);
+    if (mhi_phase_settled(e)) {
+        memcpy(mhi_ocp_x_lower(e->ocp, 0), e->window.solution.x, bytes);
+        memcpy(mhi_ocp_x_upper(e->ocp, 0), e->window.solution.x, bytes);
     }
 }
 
 void mhi_window_set_targets(mhe_estimator *e) {
-    const int32_t control = e->n_x > 2 * e->n_q ? MHI_SIGNAL_EXCITATION : MHI_SIGNAL_ACTIVATION;
-    for (int32_t k = 0; k <= e->n; k++) {
-        mhi_ocp_set_time(e->ocp, k, e->times[k]);
-        double *markers = mhi_ocp_target(e->ocp, MHI_SIGNAL_MARKERS, k);
-        double *controls = mhi_ocp_target(e->ocp, control, k);
-        double *angles = mhi_ocp_target(e->ocp, MHI_SIGNAL_Q, k);
-        if (markers != NULL) {
-            memcpy(markers, mhi_row(e->trusted, k, 3 * e->n_k),
-                   sizeof(double) * (size_t)(3 * e->n_k));
-        }
-        if (angles != NULL) {
-            memcpy(angles, mhi_row(e->angles, k, e->n_q), sizeof(double) * (size_t)e->n_q);
-        }
-        if (controls != NULL) {
-            memcpy(controls, mhi_row(e->emg, k, e->n_m), sizeof(double) * (size_t)e->n_m);
+    for (int32_t k = 0; k <= e->window.n; k++) {
+        mhi_ocp_set_time(e->ocp, k, e->window.times[k]);
+        for (int32_t i = 0; i < e->channels.n; i++) {
+            const mhi_channel *c = &e->channels.rows[i];
+            double *target = mhi_ocp_target(e->ocp, c->signal, k);
+            if (target != NULL) {
+                memcpy(target, mhi_row(c->believed, k, c->face.width),
+                       sizeof(double) * (size_t)c->face.width);
+            }
         }
     }
 }
 
 /* The newest state, which no solve has seen: where the last control leads. */
 static void extend(mhe_estimator *e) {
-    double *x = mhi_row(e->solution.x, e->n, e->n_x);
-    const double *before = mhi_row(e->solution.x, e->n - 1, e->n_x);
-    const double *u = mhi_row(e->solution.u, e->n - 1, e->n_u);
+    double *x = mhi_row(e->window.solution.x, e->window.n, e->n_x);
+    const double *before = mhi_row(e->window.solution.x, e->window.n - 1, e->n_x);
+    const double *u = mhi_row(e->window.solution.u, e->window.n - 1, e->n_u);
     mhe_status status = mhi_ocp_predict(e->ocp, before, u, x, NULL);
     for (int32_t i = 0; i < e->n_x; i++) {
         const double value = status == MHE_OK && isfinite(x[i]) ? x[i] : before[i];
-        x[i] = mhi_clip(value, mhi_ocp_x_lower(e->ocp, e->n)[i], mhi_ocp_x_upper(e->ocp, e->n)[i]);
+        x[i] = mhi_clip(value, mhi_ocp_x_lower(e->ocp, e->window.n)[i],
+                        mhi_ocp_x_upper(e->ocp, e->window.n)[i]);
     }
 }
 
 void mhi_window_follow(mhe_estimator *e) {
-    if (e->prepared) {
+    if (e->window.prepared) {
         return;
     }
     mhi_window_set_bounds(e);
     extend(e);
-    if (e->outlier > 0 &&
-        mhi_system_markers(mhi_ocp_context(e->ocp), mhi_row(e->solution.x, e->n, e->n_x),
-                           e->expected, NULL, NULL) != MHE_OK) {
-        memcpy(e->expected, e->no_markers, sizeof(double) * (size_t)(3 * e->n_k));
-    }
-    e->prepared = 1;
+    mhi_trust_expect(e);
+    e->window.prepared = 1;
 }
 
 void mhi_window_advance(mhe_estimator *e) {
-    const int32_t n = e->n;
-    shift_rows(e->times, n + 1, 1);
-    shift_rows(e->markers, n + 1, 3 * e->n_k);
-    shift_rows(e->trusted, n + 1, 3 * e->n_k);
-    shift_rows(e->angles, n + 1, e->n_q);
-    shift_rows(e->emg, n + 1, e->n_m);
-    e->filled--;
-    e->prepared = 0;
-    mhe_solution *s = &e->solution;
-    shift_rows(s->x, n + 1, e->n_x);
-    shift_rows(s->zx_lower, n + 1, e->n_x);
-    shift_rows(s->zx_upper, n + 1, e->n_x);
-    shift_rows(s->u, n, e->n_u);
-    shift_rows(s->zu_lower, n, e->n_u);
-    shift_rows(s->zu_upper, n, e->n_u);
-    shift_rows(s->lambda, n, e->n_x);
+    mhi_window *w = &e->window;
+    mhe_solution *s = &w->solution;
+    const int32_t n = w->n;
+    mhi_channels_shift(&e->channels, w->filled);
+    shift_rows(w->times, n + 1, 1);
+    w->filled--;
+    w->prepared = 0;
+    shift_rows(s->x, n + 1, w->n_x);
+    shift_rows(s->zx_lower, n + 1, w->n_x);
+    shift_rows(s->zx_upper, n + 1, w->n_x);
+    shift_rows(s->u, n, w->n_u);
+    shift_rows(s->zu_lower, n, w->n_u);
+    shift_rows(s->zu_upper, n, w->n_u);
+    shift_rows(s->lambda, n, w->n_x);
     mhi_ocp_shift(e->ocp);
+    mhi_phase_on(e, MHI_EVENT_NODES);
 }

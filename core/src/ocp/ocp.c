@@ -181,6 +181,15 @@ const mhi_signals *mhi_ocp_signals(const mhi_ocp *ocp) {
     return &ocp->signals;
 }
 
+int32_t mhi_ocp_control(const mhi_ocp *ocp) {
+    return ocp->problem.formulation == MHE_FORMULATION_EXCITATION ? MHI_SIGNAL_EXCITATION
+                                                                  : MHI_SIGNAL_ACTIVATION;
+}
+
+int32_t mhi_ocp_reads(const mhi_ocp *ocp, int32_t signal) {
+    return (ocp->wanted >> signal & 1) != 0;
+}
+
 double *mhi_ocp_x_lower(mhi_ocp *ocp, int32_t k) {
     return ocp->x_lower + (ptrdiff_t)k * ocp->face.n_x;
 }

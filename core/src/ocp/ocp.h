@@ -37,6 +37,10 @@ const mhe_stage_problem *mhi_ocp_face(const mhi_ocp *ocp); /* what a solver sees
 const mhe_problem *mhi_ocp_problem(const mhi_ocp *ocp);    /* what a cost sees */
 const mhi_signals *mhi_ocp_signals(const mhi_ocp *ocp);
 
+/* The signal that the muscles' controls are: MHI_SIGNAL_EXCITATION or MHI_SIGNAL_ACTIVATION. */
+int32_t mhi_ocp_control(const mhi_ocp *ocp);
+int32_t mhi_ocp_reads(const mhi_ocp *ocp, int32_t signal); /* 1: a term reads the signal */
+
 /* Arrays that the owner of the problem may write between solves, at node k. */
 double *mhi_ocp_x_lower(mhi_ocp *ocp, int32_t k); /* [n_x] */
 double *mhi_ocp_x_upper(mhi_ocp *ocp, int32_t k);

@@ -93,8 +93,8 @@ static int confirms(contender *c, const contender *other) {
 }
 
 static void compare(contender *rti, contender *ipopt, const mhe_estimator *e, tally *t) {
-    const int by_rti = contender_solve(rti, e->guess_x, e->guess_u);
-    const int by_ipopt = contender_solve(ipopt, e->guess_x, e->guess_u);
+    const int by_rti = contender_solve(rti, e->window.guess_x, e->window.guess_u);
+    const int by_ipopt = contender_solve(ipopt, e->window.guess_x, e->window.guess_u);
     const double x = difference(rti->at.x, ipopt->at.x, rti->n_x);
     const double u = difference(rti->at.u, ipopt->at.u, rti->n_u);
     const double objective = objective_difference(rti, ipopt);
@@ -164,12 +164,12 @@ static int follow(tally *t) {
                                  .time = r->time[k],
                                  .markers = markers.values + k * markers.n_channels,
                                  .emg = r->emg + k * mhi_system_description(f.system)->n_muscles};
-        mhe_estimate estimate;
+        mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
         assert_int_equal(mhe_estimator_push(f.estimator, &frame, &estimate, &ready, &f.err),
                          MHE_OK);
         /* The problem still is that of the solve just done. The first one had a proximal term. */
-        if (ready && f.estimator->solved > 1 && f.estimator->solved % t->every == 0) {
+        if (ready && f.estimator->window.solved > 1 && f.estimator->window.solved % t->every == 0) {
             compare(&rti, &ipopt, f.estimator, t);
         }
     }
