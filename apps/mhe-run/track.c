@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "track.h"
 
-#include "diagnosis.h"
+#include "believe/diagnosis.h"
 #include "estimator/create.h"
 #include "interrupt.h"
 #include "picture.h"
@@ -18,7 +18,7 @@ typedef struct tracking {
     mhe_estimator *estimator;
     mhi_recording *recording;
     mhi_errors *errors;
-    diagnosis *diagnosis;
+    mhi_diagnosis *diagnosis;
     mhe_outbox *outbox;
     results *results;
     summary summary;
@@ -99,7 +99,7 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         t->summary.emg = t->recording->emg_report;
         t->summary.alignment = t->recording->alignment;
         status =
-            diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis, err);
+            mhi_diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis, err);
     }
     if (status == MHE_OK && !s->check_only) {
         status = results_open(t->outbox, &t->summary.info, t->recording, &s->run->output.formats,
@@ -109,9 +109,9 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
 }
 
 static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_error *err) {
-    diagnosis_add(t->diagnosis, estimate);
-    mhe_status status = results_write(t->results, estimate, diagnosis_distances(t->diagnosis),
-                                      diagnosis_emg(t->diagnosis), err);
+    mhi_diagnosis_add(t->diagnosis, estimate);
+    mhe_status status = results_write(t->results, estimate, mhi_diagnosis_distances(t->diagnosis),
+                                      mhi_diagnosis_emg(t->diagnosis), err);
     if (status == MHE_OK) {
         status = tally_add(&t->summary.tally, estimate, err);
     }
@@ -206,7 +206,7 @@ static void tell(const tracking *t) {
     mhi_text text = {0};
     mhe_error why = {0};
     summary_lines(&t->summary, &text);
-    diagnosis_lines(t->diagnosis, &text);
+    mhi_diagnosis_lines(t->diagnosis, &text);
     if (!text.failed) {
         (void)fputs(text.data, stdout);
         (void)printf("results in %s\n", t->setup->out);
@@ -273,7 +273,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     results_close(t.results);
     mhe_outbox_close(t.outbox);
     mhi_errors_free(t.errors);
-    diagnosis_free(t.diagnosis);
+    mhi_diagnosis_free(t.diagnosis);
     mhi_recording_free(t.recording);
     mhe_estimator_close(t.estimator);
     tally_free(&t.summary.tally);

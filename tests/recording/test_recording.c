@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A second of the real abduction: the model holds it, and faults of the data move the estimate by
  * no more than they should. Skipped where the reference data are absent. */
-#include "exchange.h"
+#include "believe/exchange.h"
 #include "support.h"
 #include "track.h"
 
@@ -193,7 +193,7 @@ static void exchanged_labels_are_named(void **state) {
         {"EPICl", "EPICm"}, {"SCAP_IA", "SCAP_AA"}, {"DELT", "ARMl"}, {"CLAV_AC", "Acrom"}};
     mhe_estimator *estimator = NULL;
     mhe_error err = {0};
-    exchange found[3];
+    mhi_exchange found[3];
     open_faulty(NULL, 0);
     const int32_t n_k = faulty.model->n_markers;
     uint8_t suspect[64];
@@ -203,13 +203,13 @@ static void exchanged_labels_are_named(void **state) {
         fail_msg("%s", err.text);
     }
     const mhi_system *system = mhi_estimator_system(estimator);
-    assert_int_equal(exchange_find(system, faulty.recording, suspect, found, 3), 0);
+    assert_int_equal(mhi_exchange_find(system, faulty.recording, suspect, found, 3), 0);
     for (size_t i = 0; i < sizeof pairs / sizeof pairs[0]; i++) {
         const ptrdiff_t first = track_marker(&faulty, 0, pairs[i][0]) - faulty.recording->markers;
         const ptrdiff_t other = track_marker(&faulty, 0, pairs[i][1]) - faulty.recording->markers;
         const int32_t a = (int32_t)first / 3, b = (int32_t)other / 3;
         exchange_columns(faulty.recording, n_k, a, b);
-        assert_int_equal(exchange_find(system, faulty.recording, suspect, found, 3), 1);
+        assert_int_equal(mhi_exchange_find(system, faulty.recording, suspect, found, 3), 1);
         print_message("%s and %s: %.1f mm, exchanged %.1f mm\n", pairs[i][0], pairs[i][1],
                       1e3 * found[0].as_is, 1e3 * found[0].fixed);
         assert_true((found[0].a == a && found[0].b == b) || (found[0].a == b && found[0].b == a));

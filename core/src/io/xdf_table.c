@@ -2,6 +2,7 @@
 /* xdf_table.c: streams of an .xdf file as tables of markers and of analog channels. */
 #include "io/xdf.h"
 
+#include "io/length_unit.h"
 #include "io/slurp.h"
 
 #include <math.h>
@@ -72,19 +73,10 @@ static int32_t find_markers(const mhi_xdf_stream *s, marker *out) {
     return whole;
 }
 
+/* Without a word for it, metres, as the format's community has it. */
 static double metres(const char *unit) {
-    static const struct {
-        const char *name;
-        double metres;
-    } units[] = {{"mm", 1e-3},  {"millimeters", 1e-3}, {"millimetres", 1e-3},
-                 {"cm", 1e-2},  {"centimeters", 1e-2}, {"centimetres", 1e-2},
-                 {"meters", 1}, {"metres", 1},         {"m", 1}};
-    for (size_t i = 0; i < sizeof units / sizeof *units; i++) {
-        if (strcasecmp(unit, units[i].name) == 0) {
-            return units[i].metres;
-        }
-    }
-    return 1;
+    const mhi_length_unit known = mhi_length_unit_of((mhi_cell){unit, strlen(unit)});
+    return known.metres > 0 ? known.metres : 1;
 }
 
 /* Samples whose time does not come after the last one's are left out: returns how many. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "diagnosis.h"
+#include "believe/diagnosis.h"
 
 #include "base/arena.h"
-#include "exchange.h"
+#include "believe/exchange.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -23,7 +23,7 @@ typedef struct tally {
     int32_t n, missing;
 } tally;
 
-struct diagnosis {
+struct mhi_diagnosis {
     const mhe_estimator_info *info;
     const mhi_run *run;
     const mhi_recording *recording;
@@ -37,11 +37,11 @@ struct diagnosis {
     mhi_arena arena;
 };
 
-mhe_status diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
-                            const mhi_recording *recording, const mhi_system *system,
-                            diagnosis **result, mhe_error *err) {
+mhe_status mhi_diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
+                                const mhi_recording *recording, const mhi_system *system,
+                                mhi_diagnosis **result, mhe_error *err) {
     mhi_arena arena = {0};
-    diagnosis *d = MHI_TAKE(&arena, diagnosis, 1);
+    mhi_diagnosis *d = MHI_TAKE(&arena, mhi_diagnosis, 1);
     const int32_t n_k = info->n_markers;
     *result = NULL;
     if (d == NULL) {
@@ -63,14 +63,14 @@ mhe_status diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
     d->arena = arena;
     if (!d->distance || !d->emg || !d->markers || !d->muscles || !d->torques || !d->moments ||
         !d->at_bound || !d->exchanged || !d->compared) {
-        diagnosis_free(d);
+        mhi_diagnosis_free(d);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     *result = d;
     return MHE_OK;
 }
 
-void diagnosis_free(diagnosis *d) {
+void mhi_diagnosis_free(mhi_diagnosis *d) {
     if (d != NULL) {
         mhi_arena arena = d->arena;
         mhi_arena_free(&arena);
@@ -99,7 +99,7 @@ static double apart2(const double *a, const double *b) {
     return sum;
 }
 
-static void add_markers(diagnosis *d, const double *measured, const double *estimated) {
+static void add_markers(mhi_diagnosis *d, const double *measured, const double *estimated) {
     const int32_t n_k = d->info->n_markers;
     for (int32_t i = 0; i < n_k; i++) {
         d->distance[i] = measured == NULL ? NAN : sqrt(apart2(measured + 3 * i, estimated + 3 * i));
@@ -122,7 +122,7 @@ static void add_markers(diagnosis *d, const double *measured, const double *esti
     }
 }
 
-void diagnosis_add(diagnosis *d, const mhe_estimate *e) {
+void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     const mhe_estimator_info *f = d->info;
     const mhi_recording *r = d->recording;
     while (d->frame + 1 < r->n_frames &&
@@ -146,11 +146,11 @@ void diagnosis_add(diagnosis *d, const mhe_estimate *e) {
     }
 }
 
-const double *diagnosis_distances(const diagnosis *d) {
+const double *mhi_diagnosis_distances(const mhi_diagnosis *d) {
     return d->distance;
 }
 
-const double *diagnosis_emg(const diagnosis *d) {
+const double *mhi_diagnosis_emg(const mhi_diagnosis *d) {
     return d->emg;
 }
 
@@ -177,16 +177,16 @@ static int32_t worst(const tally *all, int32_t n, double least, int32_t *which) 
 
 /* Pairs whose labels are exchanged in all frames, which the posture nearest to all markers tells
  * although the estimate may have come to terms with them. */
-static int32_t add_exchanges_of_all(const diagnosis *d, mhi_text *out) {
+static int32_t add_exchanges_of_all(const mhi_diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
-    exchange pairs[NAMED];
+    mhi_exchange pairs[NAMED];
     uint8_t *suspect = calloc((size_t)f->n_markers + 1, 1);
     int32_t n = 0;
     for (int32_t i = 0; i < f->n_markers && suspect != NULL; i++) {
         suspect[i] = rms(&d->markers[i]) > FAR;
         n += suspect[i];
     }
-    n = n == 0 ? 0 : exchange_find(d->system, d->recording, suspect, pairs, NAMED);
+    n = n == 0 ? 0 : mhi_exchange_find(d->system, d->recording, suspect, pairs, NAMED);
     for (int32_t i = 0; i < n; i++) {
         mhi_text_add(out,
                      "markers %s and %s look exchanged: all markers are %.1f mm from the nearest "
@@ -198,7 +198,7 @@ static int32_t add_exchanges_of_all(const diagnosis *d, mhi_text *out) {
     return n;
 }
 
-static void exchange_lines(const diagnosis *d, mhi_text *out) {
+static void exchange_lines(const mhi_diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t n = add_exchanges_of_all(d, out);
     const int32_t of_all = n > 0;
@@ -216,7 +216,7 @@ static void exchange_lines(const diagnosis *d, mhi_text *out) {
     mhi_text_add(out, n > 0 ? "try: exchange their labels in the marker file\n" : "");
 }
 
-static void marker_lines(const diagnosis *d, mhi_text *out) {
+static void marker_lines(const mhi_diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t which[NAMED], n = worst(d->markers, f->n_markers, 0, which);
     if (d->n_wanted == 0 || n == 0) {
@@ -240,7 +240,7 @@ static void marker_lines(const diagnosis *d, mhi_text *out) {
 }
 
 /* How well the muscles follow their EMG, over all that have one. */
-static void emg_line(const diagnosis *d, mhi_text *out) {
+static void emg_line(const mhi_diagnosis *d, mhi_text *out) {
     tally all = {0};
     int32_t which[NAMED], n_with = 0;
     for (int32_t i = 0; i < d->info->n_muscles; i++) {
@@ -255,7 +255,7 @@ static void emg_line(const diagnosis *d, mhi_text *out) {
     }
 }
 
-static void muscle_lines(const diagnosis *d, mhi_text *out) {
+static void muscle_lines(const mhi_diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t n = 0;
     for (int32_t i = 0; i < f->n_muscles; i++) {
@@ -281,7 +281,7 @@ static void muscle_lines(const diagnosis *d, mhi_text *out) {
     }
 }
 
-static void torque_lines(const diagnosis *d, mhi_text *out) {
+static void torque_lines(const mhi_diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t n = 0;
     for (int32_t i = 0; i < f->n_q; i++) {
@@ -298,7 +298,7 @@ static void torque_lines(const diagnosis *d, mhi_text *out) {
     }
 }
 
-void diagnosis_lines(const diagnosis *d, mhi_text *out) {
+void mhi_diagnosis_lines(const mhi_diagnosis *d, mhi_text *out) {
     if (d->n > 0) {
         marker_lines(d, out);
         muscle_lines(d, out);

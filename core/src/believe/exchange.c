@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "exchange.h"
+#include "believe/exchange.h"
 
 #include "base/arena.h"
 #include "estimator/start.h"
@@ -70,8 +70,8 @@ static double fit(search *s) {
     return n == 0 ? NAN : sqrt(squares / n);
 }
 
-int32_t exchange_find(const mhi_system *system, const mhi_recording *recording,
-                      const uint8_t *suspect, exchange *out, int32_t most) {
+int32_t mhi_exchange_find(const mhi_system *system, const mhi_recording *recording,
+                          const uint8_t *suspect, mhi_exchange *out, int32_t most) {
     search s = {0};
     int32_t n = 0;
     if (recording->markers == NULL || !search_open(&s, system, recording)) {
@@ -79,7 +79,7 @@ int32_t exchange_find(const mhi_system *system, const mhi_recording *recording,
         return 0;
     }
     for (double now = fit(&s); n < most; now = out[n++].fixed) {
-        exchange best = {.as_is = now, .fixed = INFINITY};
+        mhi_exchange best = {.as_is = now, .fixed = INFINITY};
         for (int32_t a = 0; a < s.n_k; a++) {
             for (int32_t b = a + 1; b < s.n_k; b++) {
                 if (!suspect[a] && !suspect[b]) {
@@ -88,7 +88,7 @@ int32_t exchange_find(const mhi_system *system, const mhi_recording *recording,
                 swap(&s, a, b);
                 const double fixed = fit(&s);
                 swap(&s, a, b);
-                best = fixed < best.fixed ? (exchange){a, b, now, fixed} : best;
+                best = fixed < best.fixed ? (mhi_exchange){a, b, now, fixed} : best;
             }
         }
         if (!(best.fixed < FITS_BETTER * now)) {
