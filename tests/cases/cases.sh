@@ -159,6 +159,16 @@ config twice hinge.bioMod 'markers: twice.trc'
 trc 100 'for (i = 1; i <= 3; i++) c[9 + i] = 5; cells = 12' 'ELB.L WRI.L WRI.M ELB.L' > twice.trc
 read_right twice 0.005 'stand twice' 'left out: ELB.L__4'
 
+# Another frame: turned, shifted, scaled and mirrored back.
+config turned hinge.bioMod 'markers: turned.trc, transform: {rotate: x-90, shift: [0.1, 0.2, -0.3]}'
+trc 100 'for (i = 1; i <= 7; i += 3) {z = c[i + 1] - 200; y = -(c[i + 2] + 300); c[i] -= 100; c[i + 1] = y; c[i + 2] = z}' > turned.trc
+read_right turned 0.005
+config scaled hinge.bioMod 'markers: scaled.trc, transform: {rotate: [[0, 0, 1], 180], scale: -2}'
+trc 100 'for (i = 1; i <= 9; i++) c[i] *= i % 3 == 0 ? -0.5 : 0.5' > scaled.trc
+read_right scaled 0.005
+config no-turn hinge.bioMod 'markers: good.trc, transform: {rotate: w90}'
+refused no-turn "no-turn.yaml:2: data.transform: 'rotate' is an axis and degrees"
+
 # Rows, gaps, times, units.
 config zeros hinge.bioMod 'markers: zeros.trc'
 trc 100 'if (k < 20) for (i = 1; i <= 6; i++) c[i] = 0' > zeros.trc

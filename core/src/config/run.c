@@ -24,8 +24,16 @@ static mhe_status no_memory(const struct reader *r) {
     return mhe_fail(r->err, MHE_E_MEMORY, "out of memory");
 }
 
+/* Of a name "data.transform", the mapping within that section. */
 static mhi_node *section_node(const mhi_run *run, const char *name) {
-    return mhi_node_find(mhi_tree_root(run->tree), name);
+    const char *dot = strchr(name, '.');
+    if (dot == NULL) {
+        return mhi_node_find(mhi_tree_root(run->tree), name);
+    }
+    char outer[32];
+    (void)snprintf(outer, sizeof outer, "%.*s", (int)(dot - name), name);
+    const mhi_node *around = mhi_node_find(mhi_tree_root(run->tree), outer);
+    return around == NULL ? NULL : mhi_node_find(around, dot + 1);
 }
 
 /* ---- sections without a plugin ---- */
@@ -93,15 +101,19 @@ static mhe_status read_plain_sections(const struct reader *r) {
     int32_t n = 0;
     const mhi_section *s = mhi_run_sections(&n);
     mhe_status status = MHE_OK;
+    mhi_run_flatten_rotate(run);
     for (const mhi_section *end = s + n; s < end && status == MHE_OK; s++) {
         if (s->iface == NULL && s->offset != 0) {
-            static const char *const lists[] = {"channels"}; /* mappings within a section */
-            const int has_list = s->offset == offsetof(mhi_run, emg);
-            status = mhi_options_fill(
-                s->options, s->n_options, run->tree, section_node(run, s->name), lists, has_list,
-                s->name, run->dir, &run->arena, (unsigned char *)run + s->offset, r->err);
+            static const char *const lists[] = {"channels", "transform"}; /* within a section */
+            const int32_t has_list =
+                s->offset == offsetof(mhi_run, emg) || s->offset == offsetof(mhi_run, data);
+            const char *const *list = lists + (s->offset == offsetof(mhi_run, data));
+            status = mhi_options_fill(s->options, s->n_options, run->tree,
+                                      section_node(run, s->name), list, has_list, s->name, run->dir,
+                                      &run->arena, (unsigned char *)run + s->offset, r->err);
         }
     }
+    status = status == MHE_OK ? mhi_run_check_transform(run, r->err) : status;
     return status == MHE_OK ? mhi_run_read_channels(run, r->err) : status;
 }
 

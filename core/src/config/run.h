@@ -43,6 +43,14 @@ typedef struct mhi_data_section {
     const char *subject;    /* whose labels ("NAME:MARKER") are read; NULL: there is one */
 } mhi_data_section;
 
+/* From the laboratory's frame to the model's: point -> scale turn point + shift. */
+typedef struct mhi_transform_section {
+    mhe_text_list rotate; /* "x-90"; [x, -90]; [ax, ay, az, degrees]; n = 0: not turned */
+    mhe_real_list shift;  /* m; n = 0: none */
+    double scale;
+    double turn[9]; /* what `rotate` means, row-major */
+} mhi_transform_section;
+
 #define MHI_EMG_LOW_PASS 0
 #define MHI_EMG_AVERAGE 1
 #define MHI_EMG_RMS 2
@@ -120,6 +128,7 @@ typedef struct mhi_run {
     mhe_text_list plugin_path; /* absolute folders */
     mhi_model_section model_file;
     mhi_data_section data;
+    mhi_transform_section transform; /* data.transform */
     mhi_emg_section emg;
     mhi_initial_section initial;
     mhi_horizon_section horizon;
@@ -140,6 +149,10 @@ typedef struct mhi_section {
     uint32_t offset; /* in mhi_run: the section's struct or, with iface, its mhi_use; 0 for "" and
                       * costs */
 } mhi_section;
+
+/* xyz of the recording's frame, a point or a direction (of a force, which is not scaled), in the
+ * model's: data.transform. [any] */
+void mhi_run_transform(const mhi_run *run, int32_t is_point, double xyz[3]);
 
 /* All sections in the order in which they are written. "costs" is a list of such sections, and
  * "a.b" stands for such a list `b` within section `a`. [any] */

@@ -66,6 +66,17 @@ static const mhe_option data_options[] = {
                  "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };
 
+static const mhe_option transform_options[] = {
+    MHE_OPT_TEXTS(
+        mhi_transform_section, rotate, 0,
+        "Turn about an axis by degrees: x-90, or [AXIS, DEGREES], where the axis is x, y, z "
+        "or [a, b, c]."),
+    MHE_OPT_REALS(mhi_transform_section, shift, 0, -DBL_MAX, DBL_MAX, "m",
+                  "Added afterwards, in the model's frame."),
+    MHE_OPT_REAL(mhi_transform_section, scale, 1, -1e6, 1e6, "1",
+                 "Factor of all positions; below 0 they are mirrored through the origin."),
+};
+
 static const mhe_option emg_options[] = {
     MHE_OPT_BOOL(mhi_emg_section, process, 1,
                  "Band-pass, rectify and smooth; false: the columns are envelopes."),
@@ -191,6 +202,11 @@ static const mhi_section sections[] = {
     SECTION("muscle", "Forces and activation dynamics of the muscles.", MHE_MUSCLE_IFACE,
             muscle_options, AT(muscle)),
     SECTION("data", "Measured motion.", NULL, data_options, AT(data)),
+    SECTION(
+        "data.transform",
+        "From the frame of the recording's markers to the model's: first turned and scaled, then "
+        "shifted.",
+        NULL, transform_options, AT(transform)),
     SECTION("emg", "From electrodes to muscles; to be given with channels.", NULL, emg_options,
             AT(emg)),
     SECTION("emg.channels", "A list: the electrodes. Muscles that none of them names have no EMG.",

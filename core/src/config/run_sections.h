@@ -31,6 +31,11 @@ mhe_status mhi_run_read_channels(mhi_run *run, mhe_error *err);
 /* That list as YAML, within its section. */
 void mhi_run_write_channels(const mhi_run *run, mhi_text *out);
 
+/* What data.transform means (run_transform.c): lists are made flat before the section is read, and
+ * the turn computed after it. [cold] */
+void mhi_run_flatten_rotate(const mhi_run *run);
+mhe_status mhi_run_check_transform(mhi_run *run, mhe_error *err);
+
 /* Is every output.formats one that there is? (run_output.c). [cold] */
 mhe_status mhi_run_check_formats(const mhi_run *run, mhe_error *err);
 

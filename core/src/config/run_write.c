@@ -57,6 +57,11 @@ void mhi_run_write(const mhi_run *run, mhi_text *out) {
             mhi_run_write_channels(run, out);
             continue;
         }
+        if (strchr(s->name, '.') != NULL) { /* within the section before */
+            mhi_text_add(out, "  %s:\n", strchr(s->name, '.') + 1);
+            mhi_options_write(s->options, s->n_options, part, 4, out);
+            continue;
+        }
         mhi_text_add(out, "%s:\n", s->name);
         if (s->iface == NULL) {
             mhi_options_write(s->options, s->n_options, part, 2, out);
