@@ -5,7 +5,7 @@
 # (MHE_SHARED or ../shared) the files of data/cases too.
 #   cases.sh PATH/mhe-run SOURCE_DIR
 set -u
-run=$1
+run=$(realpath "$1")
 shared=${MHE_SHARED:-$2/../shared}/data/cases
 . "$(dirname "$0")/../support/script.sh"
 count=0

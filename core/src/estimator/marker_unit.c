@@ -58,13 +58,13 @@ static double unit_error(double scale) {
     return 1;
 }
 
-void mhi_marker_settle_unit(mhi_recording *r, const mhe_description *d, const char *path,
-                            const mhe_host *host) {
+void mhi_marker_settle_unit(mhi_recording *r, const mhe_description *d, double factor,
+                            const char *path, const mhe_host *host) {
     static const struct {
         const char *name;
         double metres;
     } units[] = {{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}};
-    const double scale = marker_scale(d, r->markers, r->n_frames);
+    const double scale = factor * marker_scale(d, r->markers, r->n_frames);
     const double wrong = unit_error(scale), metres = r->unit / wrong;
     const char *name = NULL;
     for (size_t i = 0; i < sizeof units / sizeof units[0]; i++) {

@@ -5,10 +5,11 @@
 
 #include "estimator/recording.h"
 
-/* Distances of markers on one body are known. Where the measured ones are larger or smaller by a
- * power of ten as between mm, cm and m, the recording's markers and unit are put right; that, or
- * distances that fit in no way, is told to the host. [cold] */
-void mhi_marker_settle_unit(mhi_recording *recording, const mhe_description *model,
+/* Distances of markers on one body are known; the measured ones still get `factor`. Where the
+ * measured ones are larger or smaller by a power of ten as between mm, cm and m, the recording's
+ * markers and unit are put right; that, or distances that fit in no way, is told to the host.
+ * [cold] */
+void mhi_marker_settle_unit(mhi_recording *recording, const mhe_description *model, double factor,
                             const char *path, const mhe_host *host);
 
 #endif

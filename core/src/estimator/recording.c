@@ -32,7 +32,8 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
                                        &r->n_markers_found, host, err);
     }
     if (status == MHE_OK) {
-        mhi_marker_settle_unit(r, d, table->path, host);
+        const double scale = fabs(run->transform.scale);
+        mhi_marker_settle_unit(r, d, scale > 0 ? scale : 1, table->path, host);
         for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * d->n_markers; i++) {
             mhi_run_transform(run, 1, r->markers + 3 * i);
         }
