@@ -39,31 +39,33 @@ const char *const layer_names[N_LAYERS] = {"skeleton kinematics, all outputs",
                                            "linearisation of the window"};
 
 typedef struct point {
-    const double *x, *u, *a, *r;
+    const double *x, *u;
+    mhe_system_point at;
 } point;
 
 static point next_point(layers *l) {
     const int32_t i = l->next;
     l->next = i + 1 == l->rig->n_points ? 0 : i + 1;
     const mhe_system *s = l->system;
-    const double *x = l->rig->x + (ptrdiff_t)i * s->n_x, *u = l->rig->u + (ptrdiff_t)i * s->n_u;
-    return (point){x, u, s->n_a > 0 ? x + 2 * s->n_q : u, s->n_r > 0 ? u + s->n_m : NULL};
+    point p = {.x = l->rig->x + (ptrdiff_t)i * s->n_x, .u = l->rig->u + (ptrdiff_t)i * s->n_u};
+    mhi_system_point(mhi_estimator_system(l->rig->estimator), p.x, p.u, NULL, &p.at);
+    return p;
 }
 
 static mhe_status call_kinematics(layers *l, mhe_error *err) {
     const point p = next_point(l);
-    return l->model->kinematics(l->model_context, p.x, p.x + l->system->n_q, &l->kinematics, err);
+    return l->model->kinematics(l->model_context, p.at.q, p.at.v, &l->kinematics, err);
 }
 
 static mhe_status call_acceleration(layers *l, const mhe_acceleration *out, mhe_error *err) {
     const point p = next_point(l);
-    return l->system->acceleration(l->system, l->system_context, p.x, p.x + l->system->n_q, p.a,
-                                   p.r, out, err);
+    return l->system->acceleration(l->system, l->system_context, &p.at, out, err);
 }
 
 static mhe_status call_rate(layers *l, mhe_error *err) {
     const point p = next_point(l);
-    return l->system->activation_rate(l->system, p.u, p.a, l->rate, l->rate_e, l->rate_a, err);
+    return l->system->activation_rate(l->system, p.at.c, p.at.a, l->rate, l->rate_e, l->rate_a,
+                                      err);
 }
 
 static mhe_status call_stage(layers *l, const mhe_stage_values *out, mhe_error *err) {
@@ -135,7 +137,7 @@ static mhe_status call(layers *l, int32_t layer, mhe_error *err) {
 }
 
 int layers_has(const layers *l, int32_t layer) {
-    return layer != LAYER_ACTIVATION_RATE || l->system->n_a > 0;
+    return layer != LAYER_ACTIVATION_RATE || l->system->n_d > 0;
 }
 
 mhe_status layers_time(layers *l, int32_t layer, int32_t calls, double *seconds, mhe_error *err) {
@@ -152,7 +154,8 @@ mhe_status layers_time(layers *l, int32_t layer, int32_t calls, double *seconds,
 static mhe_status take_arrays(layers *l, mhe_error *err) {
     const mhe_estimator_info *info = &l->rig->info;
     const int32_t n_q = l->system->n_q, n_m = l->system->n_m, n_r = l->system->n_r;
-    const int32_t n_x = l->system->n_x, n_u = l->system->n_u;
+    const int32_t n_x = l->system->n_x, n_u = l->system->n_u, n_a = l->system->n_a;
+    const int32_t n_p = mhi_system_description(mhi_estimator_system(l->rig->estimator))->n_paths;
     mhe_kinematics *kin = &l->kinematics;
     mhe_acceleration *d = &l->derivatives;
     mhe_stage_values *all = &l->all;
@@ -164,15 +167,15 @@ static mhe_status take_arrays(layers *l, mhe_error *err) {
         int32_t n;
     } wanted[] = {{&kin->mass, n_q * n_q},
                   {&kin->bias, n_q},
-                  {&kin->length, n_m},
-                  {&kin->length_q, n_m * n_q},
-                  {&kin->length_qq, n_m * n_q * n_q},
+                  {&kin->length, n_p},
+                  {&kin->length_q, n_p * n_q},
+                  {&kin->length_qq, n_p * n_q * n_q},
                   {&kin->marker, 3 * info->n_markers},
                   {&kin->marker_q, 3 * info->n_markers * n_q},
                   {&d->vdot, n_q},
                   {&d->vdot_q, n_q * n_q},
                   {&d->vdot_v, n_q * n_q},
-                  {&d->vdot_a, n_q * n_m},
+                  {&d->vdot_a, n_q * n_a},
                   {&d->vdot_r, n_q * n_r},
                   {&l->rate, n_m},
                   {&l->rate_e, n_m},

@@ -22,8 +22,9 @@ static void keep_point(rig *r, const mhe_system *face, const mhe_estimate *e) {
     memcpy(x, e->q, n_q);
     memcpy(x + face->n_q, e->qdot, n_q);
     memcpy(u, e->excitation == NULL ? e->activation : e->excitation, n_m);
-    if (face->n_a > 0) {
-        memcpy(x + 2 * face->n_q, e->activation, n_m);
+    const mhe_block *activation = mhe_layout_find(face->layout, MHE_ROLE_STATE, "activation");
+    if (activation != NULL) {
+        memcpy(x + activation->first, e->activation, n_m);
     }
     if (face->n_r > 0) {
         memcpy(u + face->n_m, e->residual, sizeof(double) * (size_t)face->n_r);

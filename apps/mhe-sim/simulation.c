@@ -114,11 +114,12 @@ mhe_status simulation_files(simulation *s, const char *folder, const char *input
 }
 
 mhe_status simulation_write(simulation *s, double time, mhe_error *err) {
-    const int driven = s->n_x > 2 * s->n_q;
-    const double *a = driven ? s->x + 2 * s->n_q : s->u;
+    const double *a = mhi_system_activation(s->system, s->x, s->u);
     const size_t n_m = sizeof(double) * (size_t)s->n_m;
     mhi_muscle_state muscles;
-    mhe_status status = mhi_system_muscles(s->context, s->x, s->x + s->n_q, a, 0, &muscles, err);
+    mhe_system_point at;
+    mhi_system_point(s->system, s->x, s->u, NULL, &at);
+    mhe_status status = mhi_system_muscles(s->context, &at, 0, &muscles, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -138,8 +139,8 @@ mhe_status simulation_write(simulation *s, double time, mhe_error *err) {
 }
 
 mhe_status simulation_step(simulation *s, double time, mhe_error *err) {
-    mhe_status status = s->integrator->step(s->integrator_context, s->x, s->u, 1 / s->rate, NULL,
-                                            s->x_next, NULL, NULL, err);
+    mhe_status status = s->integrator->step(s->integrator_context, s->x, s->u, NULL, 1 / s->rate,
+                                            NULL, s->x_next, NULL, err);
     if (status != MHE_OK) {
         const mhe_error why = *err;
         return mhe_fail(err, MHE_E_NUMERIC, "integration stopped at %g s: %.500s", time, why.text);

@@ -1,40 +1,85 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* check_integrator.c: a damped pendulum pulled by one muscle whose force depends on angle and
- * speed; both formulations, with and without a residual torque. */
+ * speed; both formulations, with and without a residual torque, an input, states of the muscle
+ * beside its activation, a parameter. */
 #include "kit.h"
 
 #include <math.h>
 #include <mhe/integrator.h>
 #include <string.h>
 
-#define MAX_X 3
+#define MAX_X 5
 #define MAX_U 2
 
 typedef struct pendulum {
     mhe_status refuse; /* what acceleration() is to return */
+    double strength;   /* the parameter */
 } pendulum;
 
-static mhe_status acceleration(const mhe_system *system, void *context, const double *q,
-                               const double *v, const double *a, const double *r,
+/* What forces see of the muscle: its activation, stretched by z where it has such states. */
+static double level_of(const mhe_system *s, const mhe_system_point *at) {
+    return s->n_z > 0 ? at->a[0] * (1.0 + 0.4 * at->z[0]) + 0.1 * at->z[1] : at->a[0];
+}
+
+static void rates(const mhe_system *s, const mhe_system_point *at, const mhe_acceleration *out) {
+    const pendulum *p = s->data;
+    const double q = at->q[0], v = at->v[0], a = at->a[0], c = at->c[0], *z = at->z;
+    const struct {
+        double *to;
+        double value[4];
+        int n;
+    } all[] = {
+        {out->zdot,
+         {-60.0 * (z[0] - p->strength * a) + 4.0 * sin(q) * v, -25.0 * z[1] + 6.0 * z[0] * c},
+         2},
+        {out->zdot_q, {4.0 * cos(q) * v, 0}, 2},
+        {out->zdot_v, {4.0 * sin(q), 0}, 2},
+        {out->zdot_a, {60.0 * p->strength, 0}, 2},
+        {out->zdot_c, {0, 6.0 * z[0]}, 2},
+        {out->zdot_z, {-60.0, 0, 6.0 * c, -25.0}, 4},
+        {s->n_p > 0 ? out->zdot_p : NULL, {60.0 * a, 0}, 2}};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        for (int k = 0; k < all[i].n && all[i].to != NULL; k++) {
+            all[i].to[k] = all[i].value[k];
+        }
+    }
+}
+
+static mhe_status acceleration(const mhe_system *system, void *context, const mhe_system_point *at,
                                const mhe_acceleration *out, mhe_error *err) {
     const pendulum *p = system->data;
+    const double q = at->q[0], v = at->v[0];
     (void)context;
     if (p->refuse != MHE_OK) {
         return mhe_fail(err, p->refuse, "the test asked for it");
     }
-    const double pull = 40.0 * a[0] * cos(q[0]) * (1.0 - 0.05 * v[0]);
-    out->vdot[0] = -15.0 * sin(q[0]) - 0.8 * v[0] + pull + (system->n_r > 0 ? 2.0 * r[0] : 0.0);
+    const double arm = 40.0 * cos(q) * (1.0 - 0.05 * v), level = level_of(system, at);
+    const double pull = p->strength * arm;
+    out->vdot[0] = -15.0 * sin(q) - 0.8 * v + pull * level +
+                   (system->n_r > 0 ? 2.0 * at->r[0] : 0.0) +
+                   (system->n_w > 0 ? 3.0 * at->w[0] * cos(q) : 0.0);
     if (out->vdot_q != NULL) {
-        out->vdot_q[0] = -15.0 * cos(q[0]) - 40.0 * a[0] * sin(q[0]) * (1.0 - 0.05 * v[0]);
+        out->vdot_q[0] = -15.0 * cos(q) - p->strength * level * 40.0 * sin(q) * (1.0 - 0.05 * v) -
+                         (system->n_w > 0 ? 3.0 * at->w[0] * sin(q) : 0.0);
     }
     if (out->vdot_v != NULL) {
-        out->vdot_v[0] = -0.8 - 2.0 * a[0] * cos(q[0]);
+        out->vdot_v[0] = -0.8 - p->strength * 2.0 * level * cos(q);
     }
     if (out->vdot_a != NULL) {
-        out->vdot_a[0] = 40.0 * cos(q[0]) * (1.0 - 0.05 * v[0]);
+        out->vdot_a[0] = pull * (system->n_z > 0 ? 1.0 + 0.4 * at->z[0] : 1.0);
+    }
+    if (out->vdot_z != NULL && system->n_z > 0) {
+        out->vdot_z[0] = pull * 0.4 * at->a[0];
+        out->vdot_z[1] = pull * 0.1;
     }
     if (out->vdot_r != NULL && system->n_r > 0) {
         out->vdot_r[0] = 2.0;
+    }
+    if (out->vdot_p != NULL && system->n_p > 0) {
+        out->vdot_p[0] = arm * level;
+    }
+    if (system->n_z > 0 && out->zdot != NULL) {
+        rates(system, at, out);
     }
     return MHE_OK;
 }
@@ -55,14 +100,30 @@ static mhe_status activation_rate(const mhe_system *system, const double *e, con
     return MHE_OK;
 }
 
-static mhe_system make_system(pendulum *p, int32_t n_a, int32_t n_r) {
+/* What a kind of system has beside the pendulum and its muscle. */
+typedef struct kind {
+    const char *title;
+    int32_t n_d, n_r, n_w, n_z, n_p;
+} kind;
+
+static mhe_system make_system(const kind *k, pendulum *p) {
+    static const int32_t z_muscle[] = {0, 0}, z_of[] = {0, 1};
+    static const mhe_layout layout = {.size = sizeof layout, .block_size = sizeof(mhe_block)};
     return (mhe_system){.size = sizeof(mhe_system),
+                        .layout = &layout,
+                        .n_x = 2 + k->n_d + k->n_z,
+                        .n_u = 1 + k->n_r,
+                        .n_w = k->n_w,
+                        .n_p = k->n_p,
                         .n_q = 1,
                         .n_m = 1,
-                        .n_r = n_r,
-                        .n_a = n_a,
-                        .n_x = 2 + n_a,
-                        .n_u = 1 + n_r,
+                        .n_a = 1,
+                        .n_d = k->n_d,
+                        .n_z = k->n_z,
+                        .n_r = k->n_r,
+                        .n_k = k->n_z,
+                        .z_muscle = z_muscle,
+                        .z_of = z_of,
                         .data = p,
                         .acceleration = acceleration,
                         .activation_rate = activation_rate};
@@ -70,29 +131,37 @@ static mhe_system make_system(pendulum *p, int32_t n_a, int32_t n_r) {
 
 /* ---- reference: classical Runge-Kutta with steps of 5 microseconds, exact to rounding ---- */
 
-static void flow(const mhe_system *s, const double *x, const double *u, double *dx) {
-    const double *a = s->n_a > 0 ? x + 2 : u;
-    const mhe_acceleration out = {.size = sizeof out, .vdot = &dx[1]};
+static void flow(const mhe_system *s, const double *x, const double *u, const double *w,
+                 double *dx) {
+    const mhe_system_point at = {.size = sizeof at,
+                                 .q = x,
+                                 .v = x + 1,
+                                 .a = s->n_d > 0 ? x + 2 : u,
+                                 .z = x + 2 + s->n_d,
+                                 .c = u,
+                                 .r = u + 1,
+                                 .w = w};
+    const mhe_acceleration out = {.size = sizeof out, .vdot = &dx[1], .zdot = dx + 2 + s->n_d};
     dx[0] = x[1];
-    (void)acceleration(s, NULL, x, x + 1, a, u + 1, &out, NULL);
-    if (s->n_a > 0) {
+    (void)acceleration(s, NULL, &at, &out, NULL);
+    if (s->n_d > 0) {
         (void)activation_rate(s, u, x + 2, &dx[2], NULL, NULL, NULL);
     }
 }
 
-static void reference_step(const mhe_system *s, const double *x, const double *u, double dt,
-                           double *next) {
+static void reference_step(const mhe_system *s, const double *x, const double *u, const double *w,
+                           double dt, double *next) {
     const int n = (int)ceil(dt / 5e-6);
     const double h = dt / n;
     double k[4][MAX_X], at[MAX_X];
     memcpy(next, x, sizeof *x * (size_t)s->n_x);
     for (int step = 0; step < n; step++) {
-        flow(s, next, u, k[0]);
+        flow(s, next, u, w, k[0]);
         for (int stage = 1; stage < 4; stage++) {
             for (int32_t i = 0; i < s->n_x; i++) {
                 at[i] = next[i] + (stage < 3 ? 0.5 : 1.0) * h * k[stage - 1][i];
             }
-            flow(s, at, u, k[stage]);
+            flow(s, at, u, w, k[stage]);
         }
         for (int32_t i = 0; i < s->n_x; i++) {
             next[i] += h / 6.0 * (k[0][i] + 2 * k[1][i] + 2 * k[2][i] + k[3][i]);
@@ -107,13 +176,21 @@ typedef struct integrator_case {
     const mhe_integrator_ops *ops;
     mhe_system system;
     double dt;
+    const double *w;
 } integrator_case;
+
+/* A step without derivatives. */
+static mhe_status plain_step(const integrator_case *c, void *context, const double *x,
+                             const double *u, double dt, double *next) {
+    return c->ops->step(context, x, u, c->w, dt, NULL, next, NULL, NULL);
+}
 
 static mhe_status call_step(void *data, void *context, void *scratch, const double *const *in,
                             double *const *out, mhe_error *err) {
     const integrator_case *c = data;
     (void)scratch;
-    return c->ops->step(context, in[0], in[1], c->dt, NULL, out[0], out[1], out[2], err);
+    const mhe_step_derivatives d = {sizeof d, out[1], out[2], c->system.n_p > 0 ? out[3] : NULL};
+    return c->ops->step(context, in[0], in[1], c->w, c->dt, NULL, out[0], &d, err);
 }
 
 /* Largest error of n steps of dt / n against the reference. */
@@ -124,11 +201,11 @@ static double flow_error(const integrator_case *c, void *context, const double *
     for (int i = 0; i < n; i++) {
         double from[MAX_X];
         memcpy(from, next, sizeof from);
-        if (c->ops->step(context, from, u, c->dt / n, NULL, next, NULL, NULL, NULL) != MHE_OK) {
+        if (plain_step(c, context, from, u, c->dt / n, next) != MHE_OK) {
             return NAN;
         }
     }
-    reference_step(&c->system, x, u, c->dt, exact);
+    reference_step(&c->system, x, u, c->w, c->dt, exact);
     for (int32_t i = 0; i < c->system.n_x; i++) {
         worst = fmax(worst, fabs(next[i] - exact[i]) / fmax(1.0, fabs(exact[i])));
     }
@@ -153,11 +230,11 @@ static void check_statuses(mhi_kit *kit, integrator_case *c, void *context, cons
     pendulum *p = c->system.data;
     double next[MAX_X];
     p->refuse = MHE_RETRY;
-    const mhe_status retry = c->ops->step(context, x, u, c->dt, NULL, next, NULL, NULL, NULL);
+    const mhe_status retry = plain_step(c, context, x, u, c->dt, next);
     p->refuse = MHE_E_NUMERIC;
-    const mhe_status failure = c->ops->step(context, x, u, c->dt, NULL, next, NULL, NULL, NULL);
+    const mhe_status failure = plain_step(c, context, x, u, c->dt, next);
     p->refuse = MHE_OK;
-    const mhe_status after = c->ops->step(context, x, u, c->dt, NULL, next, NULL, NULL, NULL);
+    const mhe_status after = plain_step(c, context, x, u, c->dt, next);
     if (retry > 0 && failure < 0 && after == MHE_OK) {
         mhi_kit_pass(kit, "the system's statuses are handed on");
     } else {
@@ -181,15 +258,16 @@ static void check_memory(mhi_kit *kit, integrator_case *c, void *context, int32_
     memory[size] = 12345;
     for (int k = 0; k < 12 && status == MHE_OK; k++) {
         const double move = k < 6 ? 0.1 * k : 0.6 + 1e-3 * k;
-        const double x[MAX_X] = {0.4 + move, -1.3 - move, 0.25 + 0.2 * move};
+        const double x[MAX_X] = {0.4 + move, -1.3 - move, 0.25 + 0.2 * move, 0.3, 0.1 - move};
         const double u[MAX_U] = {0.7 - move, -1.1 + move};
         double next[2][MAX_X], A[2][MAX_X * MAX_X], B[2][MAX_X * MAX_U];
-        double *const d[2][2] = {{A[0], B[0]}, {A[1], B[1]}};
+        const mhe_step_derivatives d[2] = {{sizeof d[0], A[0], B[0], NULL},
+                                           {sizeof d[0], A[1], B[1], NULL}};
         const int linear = k % 3 != 1; /* values alone between them */
         p->refuse = k == 4 ? MHE_RETRY : MHE_OK;
         for (int i = 0; i < 2 && status == MHE_OK; i++) {
-            status = c->ops->step(context, x, u, c->dt, i == 0 ? NULL : memory, next[i],
-                                  linear ? d[i][0] : NULL, linear ? d[i][1] : NULL, NULL);
+            status = c->ops->step(context, x, u, c->w, c->dt, i == 0 ? NULL : memory, next[i],
+                                  linear ? &d[i] : NULL, NULL);
             status = p->refuse == MHE_OK || status <= 0 ? status : MHE_OK;
         }
         if (p->refuse != MHE_OK) {
@@ -217,42 +295,87 @@ static void check_memory(mhi_kit *kit, integrator_case *c, void *context, int32_
                         worst_d, 1e-5);
 }
 
+/* x_next at [x; p]; the state is there to say how large the derivatives of a row are. */
+typedef struct parameter_case {
+    integrator_case *c;
+    void *context;
+    const double *u;
+} parameter_case;
+
+static int with_parameter(void *data, const double *xp, double *next) {
+    const parameter_case *d = data;
+    pendulum *pendulum_of = d->c->system.data;
+    pendulum_of->strength = xp[d->c->system.n_x];
+    const mhe_status status = plain_step(d->c, d->context, xp, d->u, d->c->dt, next);
+    pendulum_of->strength = 1;
+    return status != MHE_OK;
+}
+
+static void check_parameter(mhi_kit *kit, integrator_case *c, void *context, const double *x,
+                            const double *u, const double *A, const double *P) {
+    const int32_t n_x = c->system.n_x, n = n_x + 1;
+    double xp[MAX_X + 1], jacobian[MAX_X * (MAX_X + 1)];
+    parameter_case data = {c, context, u};
+    memcpy(xp, x, sizeof *x * (size_t)n_x);
+    xp[n_x] = 1;
+    for (int32_t i = 0; i < n_x; i++) {
+        memcpy(jacobian + i * n, A + i * n_x, sizeof *A * (size_t)n_x);
+        jacobian[i * n + n_x] = P[i];
+    }
+    (void)mhi_kit_limit(kit, "P against differences",
+                        mhi_jacobian_error(kit, with_parameter, &data, xp, n, n_x, jacobian),
+                        MHI_JACOBIAN_LIMIT);
+}
+
 static void check_steps(mhi_kit *kit, integrator_case *c, void *const *contexts) {
-    const int32_t n_x = c->system.n_x, n_u = c->system.n_u;
-    const double x[MAX_X] = {0.4, -1.3, 0.25}, u[MAX_U] = {0.7, -1.1};
+    const int32_t n_x = c->system.n_x, n_u = c->system.n_u, n_p = c->system.n_p;
+    const double x[MAX_X] = {0.4, -1.3, 0.25, 0.3, -0.1}, u[MAX_U] = {0.7, -1.1};
     const double *const in[] = {x, u};
-    double next[MAX_X], A[MAX_X * MAX_X], B[MAX_X * MAX_U];
+    double next[MAX_X], A[MAX_X * MAX_X], B[MAX_X * MAX_U], P[MAX_X];
+    double *const out[] = {next, A, B, P};
     mhi_probe probe = {.name = mhi_arena_format(&kit->arena, "step (%s)", c->title),
                        .n_in = 2,
-                       .n_out = 3,
+                       .n_out = 4,
                        .in = {{.n = n_x}, {.n = n_u}},
-                       .out = {{.n = n_x}, {.n = n_x * n_x}, {.n = n_x * n_u}},
+                       .out = {{.n = n_x}, {.n = n_x * n_x}, {.n = n_x * n_u}, {.n = n_x * n_p}},
                        .data = c,
                        .call = call_step};
     memcpy(probe.worker, contexts, sizeof probe.worker);
     mhi_probe_check(kit, &probe, in);
     mhe_error err = {0};
-    const mhe_status status = c->ops->step(contexts[0], x, u, c->dt, NULL, next, A, B, &err);
+    const mhe_status status = call_step(c, contexts[0], NULL, in, out, &err);
     if (status != MHE_OK) {
         mhi_kit_fail(kit, "step", "status %d (%s): %s", (int)status, c->title, err.text);
         return;
     }
     mhi_probe_jacobian(kit, &probe, in, 0, 0, A, "A against differences");
     mhi_probe_jacobian(kit, &probe, in, 1, 0, B, "B against differences");
+    if (n_p > 0) {
+        check_parameter(kit, c, contexts[0], x, u, A, P);
+    }
     check_accuracy(kit, c, contexts[0], x, u);
     check_statuses(kit, c, contexts[0], x, u);
 }
 
-static void check_system(mhi_kit *kit, const char *title, int32_t n_a, int32_t n_r) {
-    pendulum p = {MHE_OK};
-    integrator_case c = {
-        .title = title, .ops = kit->plugin->ops, .system = make_system(&p, n_a, n_r), .dt = 0.03};
+static void check_system(mhi_kit *kit, const kind *k) {
+    static const double w[] = {1.7};
+    pendulum p = {MHE_OK, 1};
+    integrator_case c = {.title = k->title,
+                         .ops = kit->plugin->ops,
+                         .system = make_system(k, &p),
+                         .dt = 0.03,
+                         .w = k->n_w > 0 ? w : NULL};
     void *self = NULL, *contexts[MHI_WORKERS] = {NULL};
     int n = 0;
     mhe_error err = {0};
-    mhe_status status = c.ops->create(&kit->host, &c.system, kit->config, &self, &err);
+    mhe_status status = MHE_OK;
+    if (c.ops->accepts != NULL && c.ops->accepts(&c.system, kit->config, &err) != MHE_OK) {
+        mhi_kit_note(kit, "not taken", "%s: \"%s\"", k->title, err.text);
+        return;
+    }
+    status = c.ops->create(&kit->host, &c.system, kit->config, &self, &err);
     if (status != MHE_OK) {
-        mhi_kit_fail(kit, "create", "status %d (%s): %s", (int)status, title, err.text);
+        mhi_kit_fail(kit, "create", "status %d (%s): %s", (int)status, k->title, err.text);
         return;
     }
     while (n < MHI_WORKERS && status == MHE_OK) {
@@ -266,7 +389,7 @@ static void check_system(mhi_kit *kit, const char *title, int32_t n_a, int32_t n
             check_memory(kit, &c, contexts[0], size);
         }
     } else {
-        mhi_kit_fail(kit, "contexts", "status %d (%s): %s", (int)status, title, err.text);
+        mhi_kit_fail(kit, "contexts", "status %d (%s): %s", (int)status, k->title, err.text);
     }
     while (n > 0) {
         c.ops->context_destroy(contexts[--n]);
@@ -275,10 +398,20 @@ static void check_system(mhi_kit *kit, const char *title, int32_t n_a, int32_t n
 }
 
 void mhi_check_integrator(mhi_kit *kit) {
+    static const kind kinds[] = {
+        {"excitation-driven", 1, 0, 0, 0, 0},
+        {"excitation-driven, residual torque", 1, 1, 0, 0, 0},
+        {"activation-driven", 0, 0, 0, 0, 0},
+        {"activation-driven, residual torque", 0, 1, 0, 0, 0},
+        {"excitation-driven, input", 1, 1, 1, 0, 0},
+        {"excitation-driven, two more states a muscle", 1, 1, 0, 2, 0},
+        {"activation-driven, two more states a muscle", 0, 0, 1, 2, 0},
+        {"excitation-driven, parameter", 1, 1, 0, 0, 1},
+        {"activation-driven, parameter", 0, 1, 0, 0, 1},
+        {"excitation-driven, two more states a muscle, parameter", 1, 0, 0, 2, 1}};
     mhi_kit_set_number(kit, "rtol", 1e-10); /* where it has them */
     mhi_kit_set_number(kit, "atol", 1e-12);
-    check_system(kit, "excitation-driven", 1, 0);
-    check_system(kit, "excitation-driven, residual torque", 1, 1);
-    check_system(kit, "activation-driven", 0, 0);
-    check_system(kit, "activation-driven, residual torque", 0, 1);
+    for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
+        check_system(kit, &kinds[i]);
+    }
 }

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* check_model.c: a made-up skeleton: three bodies on a pin, a slider and a pin whose coordinate
- * also moves the joint along a spline; two muscles, two markers. */
+/* check_model.c: kinematics and dynamics of the made-up skeleton (made_up.c). */
 #include "kit.h"
 
 #include "base/cholesky.h"
@@ -9,87 +8,28 @@
 #include <mhe/model.h>
 #include <string.h>
 
-#define N_Q 3
-#define N_M 2
-#define N_K 2
-
-#define IDENTITY \
-    { 1, 0, 0, 0, 1, 0, 0, 0, 1 }
-
-static const double zero = 0.0, minus_one = -1.0;
-static const double linear[] = {0, 1};
-static const double spline[] = {0.01, 0.02, 0.015, -0.008}; /* m over rad */
-#define LINEAR \
-    { &zero, linear, 1, 2 }
-
-static const mhe_motion upper_motion[] = {{MHE_MOTION_ROTATION, 0, {0, 0, 1}, LINEAR}};
-static const mhe_motion slide_motion[] = {{MHE_MOTION_TRANSLATION, 1, {0.6, 0, 0.8}, LINEAR}};
-static const mhe_motion lower_motion[] = {
-    {MHE_MOTION_ROTATION, 2, {0.36, 0.48, 0.8}, LINEAR},
-    {MHE_MOTION_TRANSLATION, 2, {0, 1, 0}, {&minus_one, spline, 1, 4}}};
-
-static const mhe_body bodies[] = {{"upper",
-                                   -1,
-                                   1,
-                                   upper_motion,
-                                   IDENTITY,
-                                   {0, 0.1, 0},
-                                   IDENTITY,
-                                   {0, 0, 0},
-                                   1.9,
-                                   {0.01, -0.15, 0.02},
-                                   {0.014, 0.001, 0, 0.001, 0.003, 0, 0, 0, 0.015}},
-                                  {"sleeve",
-                                   0,
-                                   1,
-                                   slide_motion,
-                                   {0, -1, 0, 1, 0, 0, 0, 0, 1},
-                                   {0.02, -0.2, 0},
-                                   IDENTITY,
-                                   {0.01, 0, 0},
-                                   0.4,
-                                   {0, 0.02, 0},
-                                   {0.001, 0, 0, 0, 0.002, 0, 0, 0, 0.0015}},
-                                  {"lower",
-                                   1,
-                                   2,
-                                   lower_motion,
-                                   IDENTITY,
-                                   {0, -0.1, 0.01},
-                                   {0, 0, 1, 1, 0, 0, 0, 1, 0},
-                                   {0, 0.01, 0.02},
-                                   1.3,
-                                   {0.02, -0.12, 0.01},
-                                   {0.009, 0, 0.0004, 0, 0.0012, 0, 0.0004, 0, 0.0095}}};
-
-static const mhe_coordinate coordinates[] = {
-    {"swing", 1, -3.0, 3.0, 0, 0}, {"slide", 0, -0.2, 0.2, 0, 0}, {"bend", 1, -2.0, 2.0, 0, 0}};
-static const mhe_marker markers[N_K] = {{"near", 0, {0.03, -0.1, 0.02}},
-                                        {"far", 2, {0.01, -0.25, 0.04}}};
-static const mhe_path_point long_path[] = {{.body = -1, .location = {0.05, 0.15, 0.02}},
-                                           {.body = 0, .location = {0.04, -0.1, 0.03}},
-                                           {.body = 2, .location = {0.03, -0.05, 0.02}}};
-static const mhe_path_point short_path[] = {{.body = 0, .location = {-0.03, -0.1, 0.0}},
-                                            {.body = 1, .location = {-0.02, -0.05, 0.01}}};
-
-static mhe_muscle made_up(const char *name) {
-    mhe_muscle m = mhe_muscle_unstated(name);
-    m.max_isometric_force = 500;
-    m.optimal_fiber_length = 0.1;
-    m.tendon_slack_length = 0.1;
-    m.pennation_angle = 0;
-    return m;
-}
+#define N_Q MHI_MADE_UP_Q
+#define N_M MHI_MADE_UP_PATHS
+#define N_K MHI_MADE_UP_MARKERS
+#define N_B MHI_MADE_UP_BODIES
 
 /* ---- probes ---- */
 
-enum { MASS, BIAS, LENGTH, LENGTH_Q, LENGTH_QQ, MARKER, MARKER_Q, N_KINEMATICS };
+enum { MASS, BIAS, LENGTH, LENGTH_Q, LENGTH_QQ, MARKER, MARKER_Q, BODY, BODY_Q, N_KINEMATICS };
 
 static mhe_status call_kinematics(void *data, void *context, void *scratch, const double *const *in,
                                   double *const *out, mhe_error *err) {
     (void)scratch;
-    const mhe_kinematics k = {sizeof k,      out[MASS],      out[BIAS],   out[LENGTH],
-                              out[LENGTH_Q], out[LENGTH_QQ], out[MARKER], out[MARKER_Q]};
+    const mhe_kinematics k = {.size = sizeof k,
+                              .mass = out[MASS],
+                              .bias = out[BIAS],
+                              .length = out[LENGTH],
+                              .length_q = out[LENGTH_Q],
+                              .length_qq = out[LENGTH_QQ],
+                              .marker = out[MARKER],
+                              .marker_q = out[MARKER_Q],
+                              .body = out[BODY],
+                              .body_q = out[BODY_Q]};
     return ((const mhe_model_ops *)data)->kinematics(context, in[0], in[1], &k, err);
 }
 
@@ -122,8 +62,9 @@ typedef struct model_case {
 } model_case;
 
 static void make_probes(mhi_kit *kit, model_case *c, void *const *contexts) {
-    static const int32_t n[N_KINEMATICS] = {N_Q * N_Q,       N_Q,     N_M,          N_M * N_Q,
-                                            N_M * N_Q * N_Q, 3 * N_K, 3 * N_K * N_Q};
+    static const int32_t n[N_KINEMATICS] = {N_Q * N_Q,       N_Q,     N_M,           N_M * N_Q,
+                                            N_M * N_Q * N_Q, 3 * N_K, 3 * N_K * N_Q, 12 * N_B,
+                                            6 * N_B * N_Q};
     mhi_probe common = {.in = {{.n = N_Q}, {.n = N_Q}, {.n = N_Q}}, .data = (void *)c->ops};
     memcpy(common.worker, contexts, sizeof common.worker);
     c->kinematics = c->inverse = c->forward = common;
@@ -197,6 +138,66 @@ static void check_dynamics(mhi_kit *kit, model_case *c, const double *const *in)
     mhi_probe_check(kit, &c->forward, forward_in);
 }
 
+/* y = poses of the bodies, moved away from 0 so that what stays 0 is seen no finer than the rest.
+ */
+typedef struct pose_case {
+    const model_case *c;
+    const double *v;
+} pose_case;
+
+static int poses(void *data, const double *q, double *y) {
+    const pose_case *p = data;
+    const mhe_kinematics out = {.size = sizeof out, .body = y};
+    const mhe_status status =
+        p->c->ops->kinematics(p->c->kinematics.worker[0], q, p->v, &out, NULL);
+    for (int i = 0; i < 12 * N_B; i++) {
+        y[i] += 2;
+    }
+    return status != MHE_OK;
+}
+
+/* Velocities of the bodies as derivatives of their poses: of the origin, and of the rotation R by
+ * w x R. */
+static void check_bodies(mhi_kit *kit, const model_case *c, const double *const *in) {
+    double jacobian[12 * N_B * N_Q];
+    for (int b = 0; b < N_B; b++) {
+        const double *r = c->out[BODY] + 12 * b + 3, *motion = c->out[BODY_Q] + 6 * b * N_Q;
+        for (int j = 0; j < N_Q; j++) {
+            double *column = jacobian + 12 * b * N_Q + j;
+            for (int k = 0; k < 3; k++) {
+                const int next = (k + 1) % 3, last = (k + 2) % 3;
+                column[k * N_Q] = motion[(3 + k) * N_Q + j];
+                for (int i = 0; i < 3; i++) {
+                    column[(3 + 3 * k + i) * N_Q] = motion[next * N_Q + j] * r[3 * last + i] -
+                                                    motion[last * N_Q + j] * r[3 * next + i];
+                }
+            }
+        }
+    }
+    pose_case data = {c, in[1]};
+    (void)mhi_kit_limit(kit, "motions of bodies against differences",
+                        mhi_jacobian_error(kit, poses, &data, in[0], N_Q, 12 * N_B, jacobian),
+                        MHI_JACOBIAN_LIMIT);
+}
+
+static void check_pattern(mhi_kit *kit, const model_case *c, const void *self) {
+    uint8_t pattern[N_M * N_Q];
+    int missed = 0;
+    if (c->ops->path_pattern == NULL) {
+        return;
+    }
+    const mhe_status status = c->ops->path_pattern(self, pattern, NULL);
+    for (int i = 0; i < N_M * N_Q && status == MHE_OK; i++) {
+        missed += c->out[LENGTH_Q][i] != 0 && !pattern[i];
+    }
+    if (status == MHE_OK && missed == 0) {
+        mhi_kit_pass(kit, "paths depend on the coordinates of their pattern alone");
+    } else {
+        mhi_kit_fail(kit, "paths depend on the coordinates of their pattern alone",
+                     "status %d, %d missing", (int)status, missed);
+    }
+}
+
 static void check_point(mhi_kit *kit, model_case *c, const double *const *in, int first) {
     mhe_error err = {0};
     double *const inverse_out[] = {c->tau, c->tau_q, c->tau_v};
@@ -220,6 +221,7 @@ static void check_point(mhi_kit *kit, model_case *c, const double *const *in, in
     mhi_probe_jacobian(kit, k, in, 0, LENGTH, c->out[LENGTH_Q], "dL/dq against differences");
     mhi_probe_jacobian(kit, k, in, 0, LENGTH_Q, c->out[LENGTH_QQ], "d2L/dq2 against differences");
     mhi_probe_jacobian(kit, k, in, 0, MARKER, c->out[MARKER_Q], "d marker/dq against differences");
+    check_bodies(kit, c, in);
     mhi_probe_jacobian(kit, &c->inverse, in, 0, 0, c->tau_q, "d tau/dq against differences");
     mhi_probe_jacobian(kit, &c->inverse, in, 1, 0, c->tau_v, "d tau/dv against differences");
 }
@@ -247,7 +249,7 @@ static void check_bad_input(mhi_kit *kit, model_case *c, const double *const *in
     }
 }
 
-static void check_evaluations(mhi_kit *kit, void *const *contexts) {
+static void check_evaluations(mhi_kit *kit, const void *self, void *const *contexts) {
     model_case c = {.ops = kit->plugin->ops};
     make_probes(kit, &c, contexts);
     double q[N_Q], v[N_Q], vdot[N_Q];
@@ -261,33 +263,18 @@ static void check_evaluations(mhi_kit *kit, void *const *contexts) {
             vdot[i] = mhi_kit_random(&seed, -5.0, 5.0);
         }
         check_point(kit, &c, in, turn == 0);
+        mhi_check_loads(kit, c.ops, contexts, c.out[BODY], c.out[BODY_Q], in, turn);
     }
+    check_pattern(kit, &c, self);
     check_bad_input(kit, &c, in);
 }
 
 void mhi_check_model(mhi_kit *kit) {
-    const mhe_muscle muscles[N_M] = {made_up("long"), made_up("short")};
-    const mhe_path paths[N_M] = {{.name = "long", .n_points = 3, .points = long_path},
-                                 {.name = "short", .n_points = 2, .points = short_path}};
-    const mhe_description description = {.size = sizeof description,
-                                         .name = "made up",
-                                         .source = "testkit",
-                                         .gravity = {0, -9.81, 0},
-                                         .n_bodies = 3,
-                                         .n_coordinates = N_Q,
-                                         .n_markers = N_K,
-                                         .n_muscles = N_M,
-                                         .bodies = bodies,
-                                         .coordinates = coordinates,
-                                         .markers = markers,
-                                         .muscles = muscles,
-                                         .n_paths = N_M,
-                                         .paths = paths};
     const mhe_model_ops *ops = kit->plugin->ops;
     void *self = NULL, *contexts[MHI_WORKERS] = {NULL};
     int n = 0;
     mhe_error err = {0};
-    mhe_status status = ops->create(&kit->host, &description, kit->config, &self, &err);
+    mhe_status status = ops->create(&kit->host, mhi_kit_description(), kit->config, &self, &err);
     if (status == MHE_E_UNSUPPORTED) {
         mhi_kit_skip(kit, "evaluation", "refuses the made-up skeleton: %s", err.text);
         return;
@@ -301,7 +288,7 @@ void mhi_check_model(mhi_kit *kit) {
         n += status == MHE_OK;
     }
     if (status == MHE_OK) {
-        check_evaluations(kit, contexts);
+        check_evaluations(kit, self, contexts);
     } else {
         mhi_kit_fail(kit, "contexts", "status %d: %s", (int)status, err.text);
     }

@@ -86,8 +86,15 @@ typedef struct iterate {
 } iterate;
 
 static mhe_solution view(iterate *w, int32_t has_multipliers) {
-    return (mhe_solution){sizeof(mhe_solution), has_multipliers, w->x,        w->u,       w->lambda,
-                          w->zx_lower,          w->zx_upper,     w->zu_lower, w->zu_upper};
+    return (mhe_solution){.size = sizeof(mhe_solution),
+                          .has_multipliers = has_multipliers,
+                          .x = w->x,
+                          .u = w->u,
+                          .lambda = w->lambda,
+                          .zx_lower = w->zx_lower,
+                          .zx_upper = w->zx_upper,
+                          .zu_lower = w->zu_lower,
+                          .zu_upper = w->zu_upper};
 }
 
 /* ---- optimality conditions, with the signs of solver.h ---- */

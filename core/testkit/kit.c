@@ -7,6 +7,7 @@
 #include "plugin/loader.h"
 
 #include <mhe/cost.h>
+#include <mhe/force.h>
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
@@ -120,7 +121,7 @@ static const struct {
 } interfaces[] = {
     {MHE_COST_IFACE, mhi_check_cost},     {MHE_MUSCLE_IFACE, mhi_check_muscle},
     {MHE_MODEL_IFACE, mhi_check_model},   {MHE_INTEGRATOR_IFACE, mhi_check_integrator},
-    {MHE_SOLVER_IFACE, mhi_check_solver},
+    {MHE_SOLVER_IFACE, mhi_check_solver}, {MHE_FORCE_IFACE, mhi_check_force},
 };
 
 /* The defaults; a plugin with a required option cannot be created without knowing what it means. */

@@ -5,6 +5,8 @@
 
 #include "base/arena.h"
 
+#include <mhe/description.h>
+#include <mhe/model.h>
 #include <mhe/plugin.h>
 #include <mhe/testkit.h>
 
@@ -73,12 +75,26 @@ double mhi_jacobian_error(mhi_kit *kit, mhi_function f, void *data, const double
 /* Exact derivatives: central differences of fourth order leave about 1e-10. */
 #define MHI_JACOBIAN_LIMIT 1e-6
 
+/* ---- a description ---- */
+
+#define MHI_MADE_UP_Q 3
+#define MHI_MADE_UP_BODIES 3
+#define MHI_MADE_UP_MARKERS 2
+#define MHI_MADE_UP_MUSCLES 2
+#define MHI_MADE_UP_PATHS 4 /* two muscles, a spring, a ligament */
+
+const mhe_description *mhi_kit_description(void);
+
 /* ---- the checks, one file an interface ---- */
 
 void mhi_check_exports(mhi_kit *kit, const char *file);
 void mhi_check_cost(mhi_kit *kit);
 void mhi_check_muscle(mhi_kit *kit);
+void mhi_check_force(mhi_kit *kit);
 void mhi_check_model(mhi_kit *kit);
+/* Loads at the point in = {q, v} of the made-up skeleton, where its bodies are and move as said. */
+void mhi_check_loads(mhi_kit *kit, const mhe_model_ops *ops, void *const *contexts,
+                     const double *body, const double *body_q, const double *const *in, int turn);
 void mhi_check_integrator(mhi_kit *kit);
 void mhi_check_solver(mhi_kit *kit);
 

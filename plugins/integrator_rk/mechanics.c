@@ -43,6 +43,14 @@ static void rk_stage(struct rk_context *c, double h, int32_t j) {
     }
 }
 
+mhe_status rk_accelerate(const struct rk_context *c, const double *q, const double *v,
+                         const double *a, const double *r, const mhe_acceleration *out,
+                         mhe_error *err) {
+    const mhe_system *system = c->rk->system;
+    const mhe_system_point at = {.size = sizeof at, .q = q, .v = v, .a = a, .r = r, .w = c->w};
+    return system->acceleration(system, c->system_context, &at, out, err);
+}
+
 /* f at stage j, with its derivatives if wanted. */
 static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, int32_t j,
                               int32_t derivatives, mhe_error *err) {
@@ -56,8 +64,7 @@ static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, i
         out.vdot_r = n_r > 0 ? c->at->f_r + j * n_q * n_r : NULL;
     }
     rk_stage(c, h, j);
-    return system->acceleration(system, c->system_context, c->stage_q, c->stage_v,
-                                c->stage_a + j * n_m, r, &out, err);
+    return rk_accelerate(c, c->stage_q, c->stage_v, c->stage_a + j * n_m, r, &out, err);
 }
 
 /* Where an iteration takes its Jacobian from. */
@@ -132,8 +139,7 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
                                   .vdot_q = c->at->f_q,
                                   .vdot_v = c->at->f_v,
                                   .vdot_a = c->at->f_a};
-    mhe_status status =
-        system->acceleration(system, c->system_context, c->q, c->v, c->a_start, r, &out, err);
+    mhe_status status = rk_accelerate(c, c->q, c->v, c->a_start, r, &out, err);
     if (status == MHE_OK) {
         rk_keep_start(c);
         status = rk_factor(c, h, 0, err);

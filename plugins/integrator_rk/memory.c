@@ -68,7 +68,7 @@ void rk_memory_layout(struct rk *rk) {
     double step = rk->config.max_step;
     rk->memory_steps = rk_at_most(ceil(RK_MEMORY_SPAN / step - 1e-9), RK_MEMORY_STEPS);
     rk->memory_traces =
-        rk->system->n_a > 0 ? rk_at_most(ceil(step / RK_MEMORY_TRACE), RK_MEMORY_TRACES) : 0;
+        rk->system->n_d > 0 ? rk_at_most(ceil(step / RK_MEMORY_TRACE), RK_MEMORY_TRACES) : 0;
     rk->memory_stride = rk_slot_size(rk) + rk->memory_traces * rk_trace_size(rk);
 }
 

@@ -137,8 +137,7 @@ static mhe_status rk_probe(struct rk_context *c, const double *r, double h,
         c->stage_v[i] = c->v[i] + h * dv;
         c->stage_q[i] = c->q[i] + h * (probe->t * c->v[i] + h * dq);
     }
-    return system->acceleration(system, c->system_context, c->stage_q, c->stage_v, c->probe_a, r,
-                                &want, err);
+    return rk_accelerate(c, c->stage_q, c->stage_v, c->probe_a, r, &want, err);
 }
 
 /* Whether steps are tested at all. */
@@ -222,7 +221,7 @@ static mhe_status rk_try(struct rk_context *c, const double *u, double h, int de
     int judged = rk_judged(rk), accurate = 1;
     mhe_status status = MHE_OK;
     c->start_kept = 0;
-    if (system->n_a > 0) {
+    if (system->n_d > 0) {
         rk_hold(c, 0);
         status = rk_activations(c, u, h, derivatives, err);
     }
@@ -234,7 +233,7 @@ static mhe_status rk_try(struct rk_context *c, const double *u, double h, int de
     }
     *cut = status == MHE_OK ? !accurate
                             : status == MHE_RETRY && depth < (judged ? RK_DEPTH : RK_HALVINGS);
-    if (*cut && system->n_a > 0) {
+    if (*cut && system->n_d > 0) {
         rk_hold(c, 1);
     }
     if (*cut || status != MHE_OK) {

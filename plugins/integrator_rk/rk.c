@@ -6,6 +6,15 @@
 #include <stdlib.h>
 #include <string.h>
 
+static mhe_status rk_accepts(const mhe_system *system, const void *config, mhe_error *err) {
+    (void)config;
+    if (system->n_z > 0) {
+        return mhe_fail(err, MHE_E_UNSUPPORTED,
+                        "muscles with states beside their activation are beyond its schemes");
+    }
+    return system->n_p > 0 ? mhe_fail(err, MHE_E_UNSUPPORTED, "it knows no parameters") : MHE_OK;
+}
+
 static void rk_destroy(void *self) {
     free(self);
 }
@@ -52,7 +61,7 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
     const mhe_system *system = rk->system;
     size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, pad = (size_t)rk->pad;
     size_t s = (size_t)rk->mechanics.stages;
-    size_t columns = 2 * n_q + (size_t)(system->n_a + system->n_u);
+    size_t columns = 2 * n_q + (size_t)(system->n_d + system->n_u);
     double *slot, *trace;
     struct rk_context *c = calloc(1, sizeof *c);
     if (c == NULL) {
@@ -131,10 +140,10 @@ static void rk_begin(struct rk_context *c, const double *x, const double *u) {
     size_t bytes_q = sizeof(double) * (size_t)n_q, bytes_m = sizeof(double) * (size_t)n_m;
     memcpy(c->q, x, bytes_q);
     memcpy(c->v, x + n_q, bytes_q);
-    memcpy(c->a, system->n_a > 0 ? x + 2 * n_q : u, bytes_m);
+    memcpy(c->a, system->n_d > 0 ? x + 2 * n_q : u, bytes_m);
     rk_fill(c->a_a, n_m, 1);
     rk_fill(c->a_e, n_m, 0);
-    if (system->n_a == 0) {
+    if (system->n_d == 0) {
         memcpy(c->a_start, u, bytes_m);
         for (int32_t j = 0; j < s; j++) {
             memcpy(c->stage_a + j * n_m, u, bytes_m);
@@ -147,37 +156,40 @@ static void rk_begin(struct rk_context *c, const double *x, const double *u) {
 /* Splits the carried derivatives into A and B. */
 static void rk_derivatives(const struct rk_context *c, double *A, double *B) {
     const mhe_system *system = c->rk->system;
-    int32_t n_q = system->n_q, n_a = system->n_a, n_x = system->n_x, n_u = system->n_u;
+    int32_t n_q = system->n_q, n_d = system->n_d, n_x = system->n_x, n_u = system->n_u;
     for (int32_t i = 0; i < 2 * n_q; i++) {
         const double *row = c->sens + i * c->columns;
         memcpy(A + i * n_x, row, sizeof(double) * (size_t)n_x);
         memcpy(B + i * n_u, row + n_x, sizeof(double) * (size_t)n_u);
     }
-    memset(A + 2 * n_q * n_x, 0, sizeof(double) * (size_t)(n_a * n_x));
-    memset(B + 2 * n_q * n_u, 0, sizeof(double) * (size_t)(n_a * n_u));
-    for (int32_t i = 0; i < n_a; i++) {
+    memset(A + 2 * n_q * n_x, 0, sizeof(double) * (size_t)(n_d * n_x));
+    memset(B + 2 * n_q * n_u, 0, sizeof(double) * (size_t)(n_d * n_u));
+    for (int32_t i = 0; i < n_d; i++) {
         A[(2 * n_q + i) * n_x + 2 * n_q + i] = c->a_a[i];
         B[(2 * n_q + i) * n_u + i] = c->a_e[i];
     }
 }
 
-static mhe_status rk_step(void *context, const double *x, const double *u, double dt,
-                          double *memory, double *x_next, double *A, double *B, mhe_error *err) {
+static mhe_status rk_step(void *context, const double *x, const double *u, const double *w,
+                          double dt, double *memory, double *x_next,
+                          const mhe_step_derivatives *out, mhe_error *err) {
     struct rk_context *c = context;
+    const int32_t derivatives = out != NULL && out->A != NULL;
     c->memory = memory;
+    c->w = w;
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q;
     int32_t n = (int32_t)fmax(1, ceil(dt / c->rk->config.max_step - 1e-9));
     rk_begin(c, x, u);
-    mhe_status status = rk_steps(c, u, n, dt / n, A != NULL, err);
+    mhe_status status = rk_steps(c, u, n, dt / n, derivatives, err);
     if (status != MHE_OK) {
         return status;
     }
     memcpy(x_next, c->q, sizeof(double) * (size_t)n_q);
     memcpy(x_next + n_q, c->v, sizeof(double) * (size_t)n_q);
-    memcpy(x_next + 2 * n_q, c->a, sizeof(double) * (size_t)system->n_a);
-    if (A != NULL) {
-        rk_derivatives(c, A, B);
+    memcpy(x_next + 2 * n_q, c->a, sizeof(double) * (size_t)system->n_d);
+    if (derivatives) {
+        rk_derivatives(c, out->A, out->B);
     }
     return MHE_OK;
 }
@@ -188,4 +200,5 @@ const mhe_integrator_ops rk_ops = {.size = sizeof rk_ops,
                                    .context_create = rk_context_create,
                                    .context_destroy = rk_context_destroy,
                                    .step = rk_step,
-                                   .memory_size = rk_memory_size};
+                                   .memory_size = rk_memory_size,
+                                   .accepts = rk_accepts};

@@ -96,10 +96,11 @@ struct rk_trace {
 struct rk_context {
     const struct rk *rk;
     void *system_context;
-    double *arrays; /* all arrays below */
-    double *memory; /* the interval's, NULL: none */
-    int32_t step;   /* mechanical steps done in the interval */
-    int32_t slot;   /* of the present one in the memory; memory_steps: none */
+    double *arrays;  /* all arrays below */
+    double *memory;  /* the interval's, NULL: none */
+    const double *w; /* inputs of the interval */
+    int32_t step;    /* mechanical steps done in the interval */
+    int32_t slot;    /* of the present one in the memory; memory_steps: none */
 
     /* activations */
     double *a, *a_a, *a_e;             /* [pad] value now; its derivatives by start and control */
@@ -128,7 +129,7 @@ struct rk_context {
     double *carry;             /* [2 n_q x 2 n_q] d(q+, v+)/d(q, v), transposed */
     double *row;               /* [n_m] */
     double *sens, *sens_next;  /* [2 n_q x columns] */
-    int32_t columns;           /* 2 n_q + n_a + n_m + n_r */
+    int32_t columns;           /* 2 n_q + n_d + n_m + n_r */
 };
 
 /* Stage activations and their derivatives for the mechanical step [0, h]; moves a, a_a, a_e to its
@@ -154,6 +155,11 @@ mhe_status rk_steps(struct rk_context *c, const double *u, int32_t n, double h, 
 /* The probes of a collocation scheme. */
 void rk_tableau_probes(const struct rk_tableau *t, struct rk_probe out[RK_PROBES]);
 void rk_tests(const struct rk_tableau *t, const struct rk_probe *probes, struct rk_test *out);
+
+/* The system's accelerations at a point with the inputs of the interval. [hot] */
+mhe_status rk_accelerate(const struct rk_context *c, const double *q, const double *v,
+                         const double *a, const double *r, const mhe_acceleration *out,
+                         mhe_error *err);
 
 /* Right after the evaluation at the start of a step (f, f_a of stage 0): keeps f at the first
  * probe. [hot] */

@@ -28,13 +28,12 @@ struct arm {
     int64_t plain, full; /* accelerations without and with derivatives */
 };
 
-static mhe_status count(const mhe_system *system, void *context, const double *q, const double *v,
-                        const double *a, const double *r, const mhe_acceleration *out,
-                        mhe_error *err) {
+static mhe_status count(const mhe_system *system, void *context, const mhe_system_point *at,
+                        const mhe_acceleration *out, mhe_error *err) {
     struct arm *arm = context;
     const mhe_system *face = system->data;
     *(out->vdot_q != NULL ? &arm->full : &arm->plain) += 1;
-    return face->acceleration(face, arm->context, q, v, a, r, out, err);
+    return face->acceleration(face, arm->context, at, out, err);
 }
 
 static mhe_status pass(const mhe_system *system, const double *e, const double *a, double *rate,
@@ -133,8 +132,9 @@ static int away_from_kinks(struct arm *arm, const struct test_integrator *fine, 
     memcpy(y, x, sizeof y);
     for (int k = 0; k <= 30; k++) {
         mhi_muscle_state now_at;
-        assert_int_equal(
-            mhi_system_muscles(arm->context, y, y + N_Q, y + 2 * N_Q, 0, &now_at, &err), MHE_OK);
+        mhe_system_point point;
+        mhi_system_point(arm->system, y, u, NULL, &point);
+        assert_int_equal(mhi_system_muscles(arm->context, &point, 0, &now_at, &err), MHE_OK);
         for (int i = 0; i < N_M; i++) {
             const mhe_muscle *m = &arm->description->muscles[i];
             double fibre = (now_at.length[i] - m->tendon_slack_length) / cos(m->pennation_angle);

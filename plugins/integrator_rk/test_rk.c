@@ -96,8 +96,9 @@ static void memory_of(const char *yaml, double most) {
                 u[i] = fmin(1, fmax(0, u[i] + move * test_random(&seed, -1, 1)));
             }
             for (int i = 0; i < 2; i++) {
-                assert_int_equal(rk.ops->step(rk.context, x, u, dt, i == 0 ? NULL : kept, next[i],
-                                              linear ? A[i] : NULL, linear ? B[i] : NULL, NULL),
+                const mhe_step_derivatives out = {.size = sizeof out, .A = A[i], .B = B[i]};
+                assert_int_equal(rk.ops->step(rk.context, x, u, NULL, dt, i == 0 ? NULL : kept,
+                                              next[i], linear ? &out : NULL, NULL),
                                  MHE_OK);
             }
             worst = fmax(worst, test_relative(next[1], next[0], system.n_x));
@@ -294,17 +295,17 @@ static void against_cvodes(void **state) {
 
 static mhe_system inner;
 
-static mhe_status domain_acceleration(const mhe_system *system, void *context, const double *q,
-                                      const double *v, const double *a, const double *r,
-                                      const mhe_acceleration *out, mhe_error *err) {
+static mhe_status domain_acceleration(const mhe_system *system, void *context,
+                                      const mhe_system_point *at, const mhe_acceleration *out,
+                                      mhe_error *err) {
     (void)system;
-    if (q[0] > 100) {
+    if (at->q[0] > 100) {
         return mhe_fail(err, MHE_E_NUMERIC, "stop");
     }
-    if (q[0] > 10) {
+    if (at->q[0] > 10) {
         return mhe_fail(err, MHE_RETRY, "outside");
     }
-    return inner.acceleration(&inner, context, q, v, a, r, out, err);
+    return inner.acceleration(&inner, context, at, out, err);
 }
 
 static void bad_points(void **state) {
@@ -315,17 +316,17 @@ static void bad_points(void **state) {
     struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
     double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
     mhe_error err = {0};
-    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, NULL, next, NULL, NULL, &err), MHE_RETRY);
+    assert_int_equal(rk.ops->step(rk.context, x, u, NULL, 0.03, NULL, next, NULL, &err), MHE_RETRY);
     assert_string_equal(err.text, "outside");
     x[0] = 101;
-    assert_int_equal(rk.ops->step(rk.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+    assert_int_equal(rk.ops->step(rk.context, x, u, NULL, 0.03, NULL, next, NULL, &err),
                      MHE_E_NUMERIC);
     const double bad[] = {NAN, INFINITY};
     for (int i = 0; i < SYSTEM_X; i++) {
         for (int k = 0; k < 2; k++) {
             double y[SYSTEM_X] = {0, 0, 0, 0, 0.5, 0.5, 0.5};
             y[i] = bad[k];
-            assert_true(rk.ops->step(rk.context, y, u, 0.03, NULL, next, NULL, NULL, &err) !=
+            assert_true(rk.ops->step(rk.context, y, u, NULL, 0.03, NULL, next, NULL, &err) !=
                         MHE_OK);
         }
     }
@@ -339,10 +340,11 @@ static void bad_points(void **state) {
 static int32_t broken_power; /* 0: a jump, 1: a kink */
 static int64_t broken_calls;
 
-static mhe_status broken_acceleration(const mhe_system *system, void *context, const double *q,
-                                      const double *v, const double *a, const double *r,
-                                      const mhe_acceleration *out, mhe_error *err) {
-    (void)system, (void)context, (void)a, (void)r, (void)err;
+static mhe_status broken_acceleration(const mhe_system *system, void *context,
+                                      const mhe_system_point *at, const mhe_acceleration *out,
+                                      mhe_error *err) {
+    const double *q = at->q, *v = at->v;
+    (void)system, (void)context, (void)err;
     double push = broken_power == 0 ? -20 : -400 * q[0], pull = broken_power == 0 ? 0 : -400;
     broken_calls++;
     out->vdot[0] = 10 + (q[0] > 0 ? push : 0);

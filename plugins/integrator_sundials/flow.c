@@ -57,21 +57,41 @@ static void flow_context_destroy(void *context) {
 /* Arrays of our own. */
 static mhe_status flow_context_arrays(struct flow_context *c, mhe_error *err) {
     const mhe_system *system = c->flow->system;
-    size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, n_r = (size_t)system->n_r;
-    size_t n_sens = (size_t)c->n_sens;
-    c->memory = calloc(n_q * (1 + 2 * n_q + n_m + n_r) + 3 * n_m + n_sens, sizeof *c->memory);
+    size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, n_z = (size_t)system->n_z;
+    size_t n_p = (size_t)system->n_p, n_sens = (size_t)c->n_sens, total = 0;
+    const struct {
+        double **array;
+        size_t n;
+    } arrays[] = {{&c->vdot, n_q},
+                  {&c->f_q, n_q * n_q},
+                  {&c->f_v, n_q * n_q},
+                  {&c->f_a, n_q * (size_t)system->n_a},
+                  {&c->f_r, n_q * (size_t)system->n_r},
+                  {&c->f_z, n_q * n_z},
+                  {&c->f_p, n_q * n_p},
+                  {&c->zdot, n_z},
+                  {&c->z_q, n_z * n_q},
+                  {&c->z_v, n_z * n_q},
+                  {&c->z_a, n_z},
+                  {&c->z_c, n_z},
+                  {&c->z_z, n_z * (size_t)system->n_k},
+                  {&c->z_p, n_z * n_p},
+                  {&c->rate, n_m},
+                  {&c->rate_e, n_m},
+                  {&c->rate_a, n_m},
+                  {&c->tolerance, n_sens}};
+    for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
+        total += arrays[i].n;
+    }
+    c->memory = calloc(total, sizeof *c->memory);
     if (c->memory == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for an integrator");
     }
-    c->vdot = c->memory;
-    c->f_q = c->vdot + n_q;
-    c->f_v = c->f_q + n_q * n_q;
-    c->f_a = c->f_v + n_q * n_q;
-    c->f_r = c->f_a + n_q * n_m;
-    c->rate = c->f_r + n_q * n_r;
-    c->rate_e = c->rate + n_m;
-    c->rate_a = c->rate_e + n_m;
-    c->tolerance = c->rate_a + n_m;
+    double *next = c->memory;
+    for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
+        *arrays[i].array = next;
+        next += arrays[i].n;
+    }
     for (size_t i = 0; i < n_sens; i++) {
         c->tolerance[i] = c->flow->config.atol;
     }
@@ -125,7 +145,7 @@ static mhe_status flow_context_create(const void *self, void *system_context, vo
     }
     c->flow = flow;
     c->system_context = system_context;
-    c->n_sens = flow->system->n_x + flow->system->n_u;
+    c->n_sens = flow->system->n_x + flow->system->n_u + flow->system->n_p;
     mhe_status status = flow_context_arrays(c, err);
     if (status == MHE_OK) {
         status = flow_context_vectors(c, err);
@@ -174,31 +194,48 @@ static mhe_status flow_failure(const struct flow_context *c, int flag, mhe_error
     return mhe_fail(err, status, "%s", c->error.text);
 }
 
-static mhe_status flow_step(void *context, const double *x, const double *u, double dt,
-                            double *memory, double *x_next, double *A, double *B, mhe_error *err) {
+/* The sensitivities as A, B and, where it is wanted, P. */
+static void flow_derivatives(const struct flow_context *c, const mhe_step_derivatives *out) {
+    const mhe_system *system = c->flow->system;
+    const int32_t n_x = system->n_x, n_u = system->n_u, n_p = system->n_p;
+    for (int32_t k = 0; k < c->n_sens; k++) {
+        const double *column = N_VGetArrayPointer(c->sens[k]);
+        for (int32_t i = 0; i < n_x; i++) {
+            if (k < n_x) {
+                out->A[i * n_x + k] = column[i];
+            } else if (k < n_x + n_u) {
+                out->B[i * n_u + k - n_x] = column[i];
+            } else if (out->P != NULL) {
+                out->P[i * n_p + k - n_x - n_u] = column[i];
+            }
+        }
+    }
+}
+
+static mhe_status flow_step(void *context, const double *x, const double *u, const double *w,
+                            double dt, double *memory, double *x_next,
+                            const mhe_step_derivatives *out, mhe_error *err) {
     struct flow_context *c = context;
     (void)memory;
-    int32_t n_x = c->flow->system->n_x, n_u = c->flow->system->n_u;
+    const int32_t n_x = c->flow->system->n_x, derivatives = out != NULL && out->A != NULL;
     sunrealtype reached = 0;
     c->u = u;
+    c->w = w;
     c->status = MHE_OK;
     c->error.text[0] = '\0';
-    int flag = flow_begin(c, x, dt, A != NULL);
+    int flag = flow_begin(c, x, dt, derivatives);
     if (flag == CV_SUCCESS) {
         flag = CVode(c->cvode, dt, c->x, &reached, CV_NORMAL);
     }
-    if (flag >= 0 && A != NULL) {
+    if (flag >= 0 && derivatives) {
         flag = CVodeGetSens(c->cvode, &reached, c->sens);
     }
     if (flag < 0) {
         return flow_failure(c, flag, err);
     }
     memcpy(x_next, N_VGetArrayPointer(c->x), sizeof(double) * (size_t)n_x);
-    for (int32_t k = 0; A != NULL && k < c->n_sens; k++) {
-        const double *column = N_VGetArrayPointer(c->sens[k]);
-        for (int32_t i = 0; i < n_x; i++) {
-            *(k < n_x ? &A[i * n_x + k] : &B[i * n_u + k - n_x]) = column[i];
-        }
+    if (derivatives) {
+        flow_derivatives(c, out);
     }
     return MHE_OK;
 }

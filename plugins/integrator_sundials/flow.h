@@ -23,25 +23,27 @@ struct flow {
 };
 
 /* One thread's memory. Parameters of the sensitivities: the n_x initial states, then the n_u
- * controls. */
+ * controls, then the system's n_p parameters. */
 struct flow_context {
     const struct flow *flow;
     void *system_context;
-    const double *u;   /* [n_u] of the step in work */
-    mhe_status status; /* worst that the system has answered in it */
-    mhe_error error;   /* and what it, or else CVODES, had to say */
+    const double *u, *w; /* [n_u], [n_w] of the step in work */
+    mhe_status status;   /* worst that the system has answered in it */
+    mhe_error error;     /* and what it, or else CVODES, had to say */
 
-    double *memory;                 /* all arrays below */
-    double *vdot;                   /* [n_q] */
-    double *f_q, *f_v, *f_a, *f_r;  /* derivatives of the accelerations */
-    double *rate, *rate_e, *rate_a; /* [n_m] activation rates */
-    double *tolerance;              /* [n_x + n_u] absolute, of the sensitivities */
+    double *memory;                            /* all arrays below */
+    double *vdot;                              /* [n_q] */
+    double *f_q, *f_v, *f_a, *f_r, *f_z, *f_p; /* derivatives of the accelerations */
+    double *z_q, *z_v, *z_a, *z_c, *z_z, *z_p; /* of the rates of z */
+    double *zdot;                              /* [n_z] */
+    double *rate, *rate_e, *rate_a;            /* [n_m] activation rates */
+    double *tolerance;                         /* [n_sens] absolute, of the sensitivities */
 
     SUNContext sundials;
     void *cvode;
     N_Vector x;
-    N_Vector *sens; /* [n_x + n_u] */
-    int32_t n_sens;
+    N_Vector *sens; /* [n_sens] */
+    int32_t n_sens; /* n_x + n_u + n_p */
     SUNMatrix matrix;
     SUNLinearSolver solver;
 };

@@ -85,17 +85,17 @@ static void same_bits_twice(void **state) {
 
 static mhe_system inner;
 
-static mhe_status domain_acceleration(const mhe_system *system, void *context, const double *q,
-                                      const double *v, const double *a, const double *r,
-                                      const mhe_acceleration *out, mhe_error *err) {
+static mhe_status domain_acceleration(const mhe_system *system, void *context,
+                                      const mhe_system_point *at, const mhe_acceleration *out,
+                                      mhe_error *err) {
     (void)system;
-    if (q[0] > 100) {
+    if (at->q[0] > 100) {
         return mhe_fail(err, MHE_E_NUMERIC, "stop");
     }
-    if (q[0] > 10) {
+    if (at->q[0] > 10) {
         return mhe_fail(err, MHE_RETRY, "outside");
     }
-    return inner.acceleration(&inner, context, q, v, a, r, out, err);
+    return inner.acceleration(&inner, context, at, out, err);
 }
 
 static void failures(void **state) {
@@ -106,20 +106,20 @@ static void failures(void **state) {
     struct test_integrator flow = test_integrator_open(SUNDIALS, "", &system, NULL);
     double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
     mhe_error err = {0};
-    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+    assert_int_equal(flow.ops->step(flow.context, x, u, NULL, 0.03, NULL, next, NULL, &err),
                      MHE_RETRY);
     assert_string_equal(err.text, "outside");
     x[0] = 101;
-    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+    assert_int_equal(flow.ops->step(flow.context, x, u, NULL, 0.03, NULL, next, NULL, &err),
                      MHE_E_NUMERIC);
     assert_string_equal(err.text, "stop");
     x[0] = NAN;
-    assert_true(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err) != MHE_OK);
+    assert_true(flow.ops->step(flow.context, x, u, NULL, 0.03, NULL, next, NULL, &err) != MHE_OK);
     x[0] = 0; /* and it goes on */
     test_integrate(&flow, x, u, 0.03, next, NULL, NULL);
     test_integrator_close(&flow);
     flow = test_integrator_open(SUNDIALS, "max_steps: 3", &system, NULL);
-    assert_int_equal(flow.ops->step(flow.context, x, u, 0.03, NULL, next, NULL, NULL, &err),
+    assert_int_equal(flow.ops->step(flow.context, x, u, NULL, 0.03, NULL, next, NULL, &err),
                      MHE_RETRY);
     assert_non_null(strstr(err.text, "CVODES"));
     test_integrator_close(&flow);

@@ -42,4 +42,10 @@ typedef struct simbody_context {
     double *length_q;                              /* [n_muscles x n_q] */
 } simbody_context;
 
+/* bodies.c: poses of the bodies and their derivatives, as mhe_kinematics has them; either may be
+ * NULL. Of a context that is placed. */
+void bodies_place(const simbody_context *c, double *body, double *body_q);
+/* Pose of one body (-1: ground) in ground. */
+void bodies_pose(const simbody_context *c, int32_t body, double r[9], double p[3]);
+
 #endif

@@ -122,13 +122,16 @@ static mhe_status context_motion(simbody_context *c, mhe_error *err) {
 /* Whatever of the outputs was asked for is finite. */
 static int results_finite(const tree *t, const mhe_kinematics *out) {
     size_t n_q = (size_t)t->n_q, n_m = (size_t)t->n_muscles, n_k = 3 * (size_t)t->n_markers;
+    size_t n_b = (size_t)t->n_bodies;
     return (out->mass == NULL || all_finite(out->mass, n_q * n_q)) &&
            (out->bias == NULL || all_finite(out->bias, n_q)) &&
            (out->length == NULL || all_finite(out->length, n_m)) &&
            (out->length_q == NULL || all_finite(out->length_q, n_m * n_q)) &&
            (out->length_qq == NULL || all_finite(out->length_qq, n_m * n_q * n_q)) &&
            (out->marker == NULL || all_finite(out->marker, n_k)) &&
-           (out->marker_q == NULL || all_finite(out->marker_q, n_k * n_q));
+           (out->marker_q == NULL || all_finite(out->marker_q, n_k * n_q)) &&
+           (out->body == NULL || all_finite(out->body, 12 * n_b)) &&
+           (out->body_q == NULL || all_finite(out->body_q, 6 * n_b * n_q));
 }
 
 mhe_status simbody_kinematics(void *context, const double *q, const double *v,
@@ -165,6 +168,7 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
     if (out->marker != NULL || out->marker_q != NULL) {
         path_markers(t, &pose, out->marker, out->marker_q);
     }
+    bodies_place(c, out->body, out->body_q);
     return results_finite(t, out) ? MHE_OK
                                   : mhe_fail(err, MHE_RETRY, "a result of the model is not finite");
 }

@@ -21,6 +21,9 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
                               const mhe_kinematics *out, mhe_error *err);
 mhe_status simbody_inverse_dynamics(void *context, const double *vdot, double *tau, double *tau_q,
                                     double *tau_v, mhe_error *err);
+mhe_status simbody_loads(void *context, const mhe_load *loads, int32_t n, const double *value,
+                         double *tau, double *tau_q, double *tau_l, mhe_error *err);
+mhe_status simbody_path_pattern(const void *self, uint8_t *pattern, mhe_error *err);
 mhe_status simbody_forward_dynamics(void *context, const double *tau, double *vdot, mhe_error *err);
 
 #endif

@@ -18,6 +18,8 @@ static const mhe_model_ops simbody_ops = {
     .kinematics = simbody_kinematics,
     .inverse_dynamics = simbody_inverse_dynamics,
     .forward_dynamics = simbody_forward_dynamics,
+    .loads = simbody_loads,
+    .path_pattern = simbody_path_pattern,
 };
 
 static const mhe_plugin simbody_plugin = {

@@ -11,11 +11,7 @@
 /* Frames of a file with all digits, multiplied, are rotations to less than this. */
 #define ROUNDING 1e-13
 
-/* Where a frame is fixed: to which link, and how. */
-typedef struct placement {
-    int32_t link;
-    double r[9], p[3];
-} placement;
+typedef tree_place placement;
 
 static const placement ground = {.link = -1, .r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
 
@@ -237,25 +233,28 @@ static mhe_status tree_allocate(const mhe_description *d, tree *t) {
     for (int32_t i = 0; i < d->n_bodies; i++) {
         n_joints += (size_t)d->bodies[i].n_motions;
     }
-    for (int32_t i = 0; i < d->n_muscles; i++) {
+    for (int32_t i = 0; i < d->n_paths; i++) {
         n_points += (size_t)d->paths[i].n_points;
     }
     t->joints = calloc(n_joints + 1, sizeof *t->joints);
+    t->bodies = calloc((size_t)d->n_bodies + 1, sizeof *t->bodies);
     t->markers = calloc((size_t)d->n_markers + 1, sizeof *t->markers);
     t->points = calloc(n_points + 1, sizeof *t->points);
-    t->fixed_length = calloc((size_t)d->n_muscles + 1, sizeof *t->fixed_length);
+    t->fixed_length = calloc((size_t)d->n_paths + 1, sizeof *t->fixed_length);
     t->segments = calloc(n_points + 1, sizeof *t->segments);
     t->chains = calloc(n_points * n_joints + 1, sizeof *t->chains);
-    return t->joints != NULL && t->markers != NULL && t->points != NULL &&
+    return t->joints != NULL && t->bodies != NULL && t->markers != NULL && t->points != NULL &&
                    t->fixed_length != NULL && t->segments != NULL && t->chains != NULL
                ? MHE_OK
                : MHE_E_MEMORY;
 }
 
-static void tree_build(const mhe_description *d, tree *t, placement *places) {
+static void tree_build(const mhe_description *d, tree *t) {
+    placement *places = t->bodies;
     t->n_q = d->n_coordinates;
     t->n_markers = d->n_markers;
-    t->n_muscles = d->n_muscles;
+    t->n_muscles = d->n_paths;
+    t->n_bodies = d->n_bodies;
     memcpy(t->gravity, d->gravity, sizeof t->gravity);
     for (int32_t i = 0; i < d->n_bodies; i++) {
         const mhe_body *body = &d->bodies[i];
@@ -275,7 +274,7 @@ static void tree_build(const mhe_description *d, tree *t, placement *places) {
         t->rounded |= off_orthogonal3(t->joints[i].r) > ROUNDING;
     }
     int32_t *chain = t->chains;
-    for (int32_t i = 0; i < d->n_muscles; i++) {
+    for (int32_t i = 0; i < d->n_paths; i++) {
         tree_add_path(t, i, &d->paths[i], places, &chain);
     }
 }
@@ -287,22 +286,19 @@ mhe_status tree_create(const mhe_description *description, tree **out, mhe_error
         return status;
     }
     tree *t = calloc(1, sizeof *t);
-    placement *places = calloc((size_t)description->n_bodies + 1, sizeof *places);
-    if (t == NULL || places == NULL || tree_allocate(description, t) != MHE_OK) {
+    if (t == NULL || tree_allocate(description, t) != MHE_OK) {
         status = mhe_fail(err, MHE_E_MEMORY, "no memory for the model's tree");
         goto fail;
     }
-    tree_build(description, t, places);
+    tree_build(description, t);
     status = tree_check_joints(t, description, err);
     if (status != MHE_OK) {
         goto fail;
     }
-    free(places);
     *out = t;
     return MHE_OK;
 
 fail:
-    free(places);
     tree_free(t);
     return status;
 }
@@ -310,6 +306,7 @@ fail:
 void tree_free(tree *t) {
     if (t != NULL) {
         free(t->joints);
+        free(t->bodies);
         free(t->markers);
         free(t->points);
         free(t->fixed_length);

@@ -24,6 +24,12 @@ typedef struct tree_joint {
     double points[9];             /* sum m d d^T, its bodies at d from there; part of inertia */
 } tree_joint;
 
+/* Where a frame is fixed: to which link (-1: ground), and how. */
+typedef struct tree_place {
+    int32_t link;
+    double r[9], p[3];
+} tree_place;
+
 typedef struct tree_point {
     int32_t link;
     double at[3]; /* in the link's frame; ground: in ground */
@@ -40,10 +46,12 @@ typedef struct tree_segment {
 } tree_segment;
 
 typedef struct tree {
-    int32_t n_q, n_joints, n_markers, n_muscles, n_points, n_segments;
+    int32_t n_q, n_joints, n_bodies, n_markers, n_points, n_segments;
+    int32_t n_muscles; /* paths: the muscles' and all others */
     double gravity[3];
     int32_t rounded; /* a joint's frame is a rotation to the digits of a file only */
     tree_joint *joints;
+    tree_place *bodies;   /* [n_bodies] */
     tree_point *markers;  /* [n_markers] */
     tree_point *points;   /* of the paths */
     double *fixed_length; /* [n_muscles]: of the path's pieces within one link, m */

@@ -41,10 +41,41 @@ static void hill_fibre_at(const struct hill_muscle *m, double l, double w,
     }
 }
 
-static mhe_status hill_force(const void *self, const double *a, const double *l, const double *w,
-                             const mhe_muscle_force *out, mhe_error *err) {
-    const struct hill *hill = self;
-    (void)err;
+/* What reports want of one muscle. */
+static void hill_report(const struct hill_muscle *m, double a, double l, double w,
+                        const struct hill_fibre *fibre, const mhe_muscle_values *out, int32_t i) {
+    const double along = l - m->l_slack;
+    struct hill_value total, passive;
+    if (out->fiber_length != NULL) {
+        out->fiber_length[i] = fibre->n / m->inverse;
+    }
+    if (out->fiber_velocity != NULL) {
+        out->fiber_velocity[i] = w * (m->height == 0 ? m->inv_cos : fibre->pull);
+    }
+    if (out->pennation != NULL) {
+        out->pennation[i] = m->height == 0 ? acos(1 / m->inv_cos) : atan2(m->height, along);
+    }
+    if (out->active != NULL || out->passive != NULL) {
+        m->curve(m, a, fibre->n, fibre->s, &total);
+        m->curve(m, 0, fibre->n, fibre->s, &passive);
+    }
+    if (out->active != NULL) {
+        out->active[i] = m->f_max * (total.f - passive.f);
+    }
+    if (out->passive != NULL) {
+        out->passive[i] = m->f_max * (passive.f + m->damping * fibre->s);
+    }
+}
+
+static int hill_reports(const mhe_muscle_values *out) {
+    return out->fiber_length != NULL || out->fiber_velocity != NULL || out->pennation != NULL ||
+           out->active != NULL || out->passive != NULL;
+}
+
+static void hill_force(const struct hill *hill, const mhe_muscle_point *at,
+                       const mhe_muscle_values *out) {
+    const double *a = at->state, *l = at->length, *w = at->velocity;
+    const int reports = hill_reports(out);
     for (int32_t i = 0; i < hill->n; i++) {
         const struct hill_muscle *m = &hill->m[i];
         struct hill_fibre fibre;
@@ -53,9 +84,11 @@ static mhe_status hill_force(const void *self, const double *a, const double *l,
         m->curve(m, a[i], fibre.n, fibre.s, &value);
         double along = value.f + m->damping * fibre.s;
         double along_s = value.f_s + m->damping;
-        out->force[i] = m->f_max * along * fibre.pull;
-        if (out->force_a != NULL) {
-            out->force_a[i] = m->f_max * value.f_a * fibre.pull;
+        if (out->force != NULL) {
+            out->force[i] = m->f_max * along * fibre.pull;
+        }
+        if (out->force_s != NULL) {
+            out->force_s[i] = m->f_max * value.f_a * fibre.pull;
         }
         if (out->force_l != NULL) {
             out->force_l[i] =
@@ -65,8 +98,10 @@ static mhe_status hill_force(const void *self, const double *a, const double *l,
         if (out->force_w != NULL) {
             out->force_w[i] = m->f_max * along_s * fibre.s_w * fibre.pull;
         }
+        if (reports) {
+            hill_report(m, a[i], l[i], w[i], &fibre, out, i);
+        }
     }
-    return MHE_OK;
 }
 
 /* De Groote et al. (2016): d = e - a, f = 0.5 tanh(b d), z = 0.5 + 1.5 a,
@@ -89,10 +124,11 @@ CLONES static void hill_rates(const struct hill *hill, const double *restrict e,
     }
 }
 
-static mhe_status hill_activation_rate(const void *self, const double *e, const double *a,
-                                       double *rate, double *rate_e, double *rate_a,
-                                       mhe_error *err) {
+/* The activation's, the only state that is diagonal. */
+static mhe_status hill_diagonal_rate(const void *self, int32_t k, const double *e, const double *a,
+                                     double *rate, double *rate_e, double *rate_a, mhe_error *err) {
     const struct hill *hill = self;
+    (void)k;
     for (int32_t i = 0; i < hill->n; i++) {
         if (0.5 + 1.5 * a[i] <= 0) {
             return mhe_fail(err, MHE_RETRY, "muscle %d: activation %g is not above -1/3", i, a[i]);
@@ -103,19 +139,50 @@ static mhe_status hill_activation_rate(const void *self, const double *e, const 
         return MHE_OK;
     }
     for (int32_t i = 0; i < hill->n; i++) {
-        double unwanted[2];
+        double unwanted[3];
         const struct hill one = {.n = 1,
                                  .smoothing = hill->smoothing,
                                  .rate_act = hill->rate_act + i,
                                  .rate_deact = hill->rate_deact + i};
-        hill_rates(&one, e + i, a + i, rate + i, rate_e != NULL ? rate_e + i : &unwanted[0],
+        hill_rates(&one, e + i, a + i, rate != NULL ? rate + i : &unwanted[2],
+                   rate_e != NULL ? rate_e + i : &unwanted[0],
                    rate_a != NULL ? rate_a + i : &unwanted[1]);
     }
+    return MHE_OK;
+}
+
+static void hill_zero(double *values, int32_t n) {
+    for (int32_t i = 0; values != NULL && i < n; i++) {
+        values[i] = 0;
+    }
+}
+
+static mhe_status hill_evaluate(const void *self, const mhe_muscle_point *at,
+                                const mhe_muscle_values *out, mhe_error *err) {
+    const struct hill *hill = self;
+    hill_force(hill, at, out);
+    hill_zero(out->rate_l, hill->n);
+    hill_zero(out->rate_w, hill->n);
+    return out->rate == NULL && out->rate_e == NULL && out->rate_s == NULL
+               ? MHE_OK
+               : hill_diagonal_rate(self, 0, at->excitation, at->state, out->rate, out->rate_e,
+                                    out->rate_s, err);
+}
+
+static mhe_status hill_layout(const void *self, mhe_muscle_layout *out, mhe_error *err) {
+    static const char *const names[] = {"activation"}, *const units[] = {"1"};
+    static const uint8_t diagonal[] = {1};
+    (void)self, (void)err;
+    out->n_states = 1;
+    out->names = names;
+    out->units = units;
+    out->diagonal = diagonal;
     return MHE_OK;
 }
 
 const mhe_muscle_ops hill_ops = {.size = sizeof hill_ops,
                                  .create = hill_create,
                                  .destroy = hill_destroy,
-                                 .force = hill_force,
-                                 .activation_rate = hill_activation_rate};
+                                 .layout = hill_layout,
+                                 .evaluate = hill_evaluate,
+                                 .diagonal_rate = hill_diagonal_rate};

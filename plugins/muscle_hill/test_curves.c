@@ -14,8 +14,8 @@ static const int32_t types[] = {
 /* y = F at x = (a, L, Ldot) of one muscle. */
 static int force_of(void *data, const double *x, double *y) {
     const struct test_hill *hill = data;
-    const mhe_muscle_force out = {.size = sizeof out, .force = y};
-    return hill->ops->force(hill->self, x, x + 1, x + 2, &out, NULL);
+    const mhe_muscle_values out = {.size = sizeof out, .force = y};
+    return test_hill_at(hill, x, x + 1, x + 2, &out, NULL);
 }
 
 static double force_at(const struct test_hill *hill, double a, double l, double w) {
@@ -48,12 +48,12 @@ static void force_derivatives(void **state) {
                 x[0] = test_random(&seed, 0.02, 1);
                 x[1] = ls + l_opt * test_random(&seed, 0.4, 1.5);
                 x[2] = test_random(&seed, -0.9, 0.9);
-                const mhe_muscle_force out = {.size = sizeof out,
-                                              .force = &f,
-                                              .force_a = jacobian,
-                                              .force_l = jacobian + 1,
-                                              .force_w = jacobian + 2};
-                assert_int_equal(hill.ops->force(hill.self, x, x + 1, x + 2, &out, NULL), MHE_OK);
+                const mhe_muscle_values out = {.size = sizeof out,
+                                               .force = &f,
+                                               .force_s = jacobian,
+                                               .force_l = jacobian + 1,
+                                               .force_w = jacobian + 2};
+                assert_int_equal(test_hill_at(&hill, x, x + 1, x + 2, &out, NULL), MHE_OK);
                 assert_true(f == force_at(&hill, x[0], x[1], x[2]));
                 double error = test_jacobian_error(force_of, &hill, x, 3, 1, jacobian);
                 assert_true(error >= 0);
@@ -68,7 +68,7 @@ static void force_derivatives(void **state) {
 
 static int rate_of(void *data, const double *x, double *y) {
     const struct test_hill *hill = data;
-    return hill->ops->activation_rate(hill->self, x, x + 1, y, NULL, NULL, NULL);
+    return hill->ops->diagonal_rate(hill->self, 0, x, x + 1, y, NULL, NULL, NULL);
 }
 
 static void activation_derivatives(void **state) {
@@ -83,13 +83,13 @@ static void activation_derivatives(void **state) {
         for (int trial = 0; trial < 100; trial++) {
             double x[2] = {test_random(&seed, -0.1, 1.1), test_random(&seed, -0.1, 1.1)};
             double rate, jacobian[2];
-            assert_int_equal(
-                hill.ops->activation_rate(hill.self, x, x + 1, &rate, jacobian, jacobian + 1, NULL),
-                MHE_OK);
+            assert_int_equal(hill.ops->diagonal_rate(hill.self, 0, x, x + 1, &rate, jacobian,
+                                                     jacobian + 1, NULL),
+                             MHE_OK);
             assert_true(test_jacobian_error(rate_of, &hill, x, 2, 1, jacobian) < 1e-7);
         }
         double a = -0.4, e = 0, rate;
-        assert_int_equal(hill.ops->activation_rate(hill.self, &e, &a, &rate, NULL, NULL, NULL),
+        assert_int_equal(hill.ops->diagonal_rate(hill.self, 0, &e, &a, &rate, NULL, NULL, NULL),
                          MHE_RETRY);
         hill.ops->destroy(hill.self);
     }
@@ -104,7 +104,7 @@ static void activation_landmarks(void **state) {
     for (int i = 0; i < 3; i++) {
         double rate, rate_e, rate_a;
         assert_int_equal(
-            hill.ops->activation_rate(hill.self, &at[i], &at[i], &rate, &rate_e, &rate_a, NULL),
+            hill.ops->diagonal_rate(hill.self, 0, &at[i], &at[i], &rate, &rate_e, &rate_a, NULL),
             MHE_OK);
         assert_true(rate == 0);
         assert_true(fabs(rate_e - expected[i]) < 1e-12 * expected[i]);

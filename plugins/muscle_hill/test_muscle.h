@@ -39,4 +39,12 @@ static inline struct test_hill test_hill(const mhe_muscle *muscles, int32_t n, c
     return hill;
 }
 
+/* Forces of rigid tendons at activations a, lengths l and velocities w; what `values` asks for. */
+static inline mhe_status test_hill_at(const struct test_hill *hill, const double *a,
+                                      const double *l, const double *w,
+                                      const mhe_muscle_values *values, mhe_error *err) {
+    const mhe_muscle_point at = {.size = sizeof at, .state = a, .length = l, .velocity = w};
+    return hill->ops->evaluate(hill->self, &at, values, err);
+}
+
 #endif

@@ -72,11 +72,11 @@ static void compare(const char *model, const char *oracle, const char *yaml) {
         numbers(state, "e", n, e);
         numbers(state, "mt_length", n, l);
         numbers(state, "mt_velocity", n, w);
-        const mhe_muscle_force out = {.size = sizeof out, .force = value};
-        assert_int_equal(hill.ops->force(hill.self, a, l, w, &out, &err), MHE_OK);
+        const mhe_muscle_values out = {.size = sizeof out, .force = value};
+        assert_int_equal(test_hill_at(&hill, a, l, w, &out, &err), MHE_OK);
         numbers(state, "force", n, expected);
         force_error = fmax(force_error, largest_error(value, expected, n));
-        assert_int_equal(hill.ops->activation_rate(hill.self, e, a, value, NULL, NULL, &err),
+        assert_int_equal(hill.ops->diagonal_rate(hill.self, 0, e, a, value, NULL, NULL, &err),
                          MHE_OK);
         numbers(state, "adot", n, expected);
         rate_error = fmax(rate_error, largest_error(value, expected, n));

@@ -5,7 +5,9 @@
  * the end of a struct that carries its size, everything else needs a new ABI or interface
  * revision. Read by C and by C++, so that both agree. */
 #include <mhe/cost.h>
+#include <mhe/force.h>
 #include <mhe/integrator.h>
+#include <mhe/layout.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
 #include <mhe/solver.h>
@@ -321,7 +323,30 @@ AT(mhe_description, unsupported, 240);
 AT(mhe_description, n_warnings, 248);
 AT(mhe_description, warnings, 256);
 
-SIZE(mhe_problem, 80);
+SIZE(mhe_block, 72);
+AT(mhe_block, name, 0);
+AT(mhe_block, role, 8);
+AT(mhe_block, structure, 12);
+AT(mhe_block, first, 16);
+AT(mhe_block, count, 20);
+AT(mhe_block, entry_names, 24);
+AT(mhe_block, units, 32);
+AT(mhe_block, owner, 40);
+AT(mhe_block, lower, 48);
+AT(mhe_block, upper, 56);
+AT(mhe_block, scale, 64);
+
+SIZE(mhe_layout, 40);
+AT(mhe_layout, size, 0);
+AT(mhe_layout, block_size, 4);
+AT(mhe_layout, n_blocks, 8);
+AT(mhe_layout, blocks, 16);
+AT(mhe_layout, n_x, 24);
+AT(mhe_layout, n_u, 28);
+AT(mhe_layout, n_w, 32);
+AT(mhe_layout, n_p, 36);
+
+SIZE(mhe_problem, 96);
 AT(mhe_problem, size, 0);
 AT(mhe_problem, formulation, 4);
 AT(mhe_problem, n_q, 8);
@@ -335,17 +360,20 @@ AT(mhe_problem, muscle_names, 48);
 AT(mhe_problem, marker_names, 56);
 AT(mhe_problem, data, 64);
 AT(mhe_problem, find_signal, 72);
+AT(mhe_problem, entry_names, 80);
+AT(mhe_problem, layout, 88);
 
-SIZE(mhe_cost_layout, 104);
+SIZE(mhe_cost_layout, 168);
 AT(mhe_cost_layout, size, 0);
 AT(mhe_cost_layout, signal, 4);
 AT(mhe_cost_layout, n_signals, 8);
 AT(mhe_cost_layout, signals, 12);
-AT(mhe_cost_layout, n_res, 76);
-AT(mhe_cost_layout, jacobian, 80);
-AT(mhe_cost_layout, scratch_bytes, 84);
-AT(mhe_cost_layout, res_unit, 88);
-AT(mhe_cost_layout, fills_missing, 96);
+AT(mhe_cost_layout, at, 76);
+AT(mhe_cost_layout, n_res, 140);
+AT(mhe_cost_layout, jacobian, 144);
+AT(mhe_cost_layout, scratch_bytes, 148);
+AT(mhe_cost_layout, res_unit, 152);
+AT(mhe_cost_layout, fills_missing, 160);
 
 SIZE(mhe_stage, 48);
 AT(mhe_stage, size, 0);
@@ -357,21 +385,15 @@ AT(mhe_stage, y, 24);
 AT(mhe_stage, y_ref, 32);
 AT(mhe_stage, scratch, 40);
 
-SIZE(mhe_muscle_force, 40);
-AT(mhe_muscle_force, size, 0);
-AT(mhe_muscle_force, force, 8);
-AT(mhe_muscle_force, force_a, 16);
-AT(mhe_muscle_force, force_l, 24);
-AT(mhe_muscle_force, force_w, 32);
+SIZE(mhe_cost_ops, 48);
+AT(mhe_cost_ops, size, 0);
+AT(mhe_cost_ops, create, 8);
+AT(mhe_cost_ops, destroy, 16);
+AT(mhe_cost_ops, layout, 24);
+AT(mhe_cost_ops, residual, 32);
+AT(mhe_cost_ops, jacobian, 40);
 
-SIZE(mhe_muscle_ops, 40);
-AT(mhe_muscle_ops, size, 0);
-AT(mhe_muscle_ops, create, 8);
-AT(mhe_muscle_ops, destroy, 16);
-AT(mhe_muscle_ops, force, 24);
-AT(mhe_muscle_ops, activation_rate, 32);
-
-SIZE(mhe_kinematics, 64);
+SIZE(mhe_kinematics, 88);
 AT(mhe_kinematics, size, 0);
 AT(mhe_kinematics, mass, 8);
 AT(mhe_kinematics, bias, 16);
@@ -380,8 +402,16 @@ AT(mhe_kinematics, length_q, 32);
 AT(mhe_kinematics, length_qq, 40);
 AT(mhe_kinematics, marker, 48);
 AT(mhe_kinematics, marker_q, 56);
+AT(mhe_kinematics, body, 64);
+AT(mhe_kinematics, body_q, 72);
+AT(mhe_kinematics, dependent, 80);
 
-SIZE(mhe_model_ops, 64);
+SIZE(mhe_load, 12);
+AT(mhe_load, body, 0);
+AT(mhe_load, axes, 4);
+AT(mhe_load, origin, 8);
+
+SIZE(mhe_model_ops, 88);
 AT(mhe_model_ops, size, 0);
 AT(mhe_model_ops, create, 8);
 AT(mhe_model_ops, destroy, 16);
@@ -390,28 +420,157 @@ AT(mhe_model_ops, context_destroy, 32);
 AT(mhe_model_ops, kinematics, 40);
 AT(mhe_model_ops, inverse_dynamics, 48);
 AT(mhe_model_ops, forward_dynamics, 56);
+AT(mhe_model_ops, loads, 64);
+AT(mhe_model_ops, path_pattern, 72);
+AT(mhe_model_ops, path_points, 80);
 
-SIZE(mhe_acceleration, 48);
+SIZE(mhe_muscle_layout, 80);
+AT(mhe_muscle_layout, size, 0);
+AT(mhe_muscle_layout, n_states, 4);
+AT(mhe_muscle_layout, activation, 8);
+AT(mhe_muscle_layout, names, 16);
+AT(mhe_muscle_layout, units, 24);
+AT(mhe_muscle_layout, lower, 32);
+AT(mhe_muscle_layout, upper, 40);
+AT(mhe_muscle_layout, present, 48);
+AT(mhe_muscle_layout, diagonal, 56);
+AT(mhe_muscle_layout, n_parameters, 64);
+AT(mhe_muscle_layout, parameter_names, 72);
+
+SIZE(mhe_muscle_point, 40);
+AT(mhe_muscle_point, size, 0);
+AT(mhe_muscle_point, excitation, 8);
+AT(mhe_muscle_point, state, 16);
+AT(mhe_muscle_point, length, 24);
+AT(mhe_muscle_point, velocity, 32);
+
+SIZE(mhe_muscle_values, 136);
+AT(mhe_muscle_values, size, 0);
+AT(mhe_muscle_values, force, 8);
+AT(mhe_muscle_values, force_s, 16);
+AT(mhe_muscle_values, force_l, 24);
+AT(mhe_muscle_values, force_w, 32);
+AT(mhe_muscle_values, rate, 40);
+AT(mhe_muscle_values, rate_e, 48);
+AT(mhe_muscle_values, rate_s, 56);
+AT(mhe_muscle_values, rate_l, 64);
+AT(mhe_muscle_values, rate_w, 72);
+AT(mhe_muscle_values, force_p, 80);
+AT(mhe_muscle_values, rate_p, 88);
+AT(mhe_muscle_values, fiber_length, 96);
+AT(mhe_muscle_values, fiber_velocity, 104);
+AT(mhe_muscle_values, pennation, 112);
+AT(mhe_muscle_values, active, 120);
+AT(mhe_muscle_values, passive, 128);
+
+SIZE(mhe_muscle_ops, 56);
+AT(mhe_muscle_ops, size, 0);
+AT(mhe_muscle_ops, create, 8);
+AT(mhe_muscle_ops, destroy, 16);
+AT(mhe_muscle_ops, layout, 24);
+AT(mhe_muscle_ops, evaluate, 32);
+AT(mhe_muscle_ops, diagonal_rate, 40);
+AT(mhe_muscle_ops, equilibrium, 48);
+
+SIZE(mhe_force_layout, 88);
+AT(mhe_force_layout, size, 0);
+AT(mhe_force_layout, name, 8);
+AT(mhe_force_layout, generalised, 16);
+AT(mhe_force_layout, n_inputs, 20);
+AT(mhe_force_layout, input_names, 24);
+AT(mhe_force_layout, input_units, 32);
+AT(mhe_force_layout, n_paths, 40);
+AT(mhe_force_layout, paths, 48);
+AT(mhe_force_layout, n_loads, 56);
+AT(mhe_force_layout, loads, 64);
+AT(mhe_force_layout, n_parameters, 72);
+AT(mhe_force_layout, parameter_names, 80);
+
+SIZE(mhe_force_point, 48);
+AT(mhe_force_point, size, 0);
+AT(mhe_force_point, q, 8);
+AT(mhe_force_point, v, 16);
+AT(mhe_force_point, length, 24);
+AT(mhe_force_point, velocity, 32);
+AT(mhe_force_point, input, 40);
+
+SIZE(mhe_force_values, 96);
+AT(mhe_force_values, size, 0);
+AT(mhe_force_values, tau, 8);
+AT(mhe_force_values, tau_q, 16);
+AT(mhe_force_values, tau_v, 24);
+AT(mhe_force_values, tau_w, 32);
+AT(mhe_force_values, tau_p, 40);
+AT(mhe_force_values, tension, 48);
+AT(mhe_force_values, tension_l, 56);
+AT(mhe_force_values, tension_w, 64);
+AT(mhe_force_values, tension_p, 72);
+AT(mhe_force_values, load, 80);
+AT(mhe_force_values, load_w, 88);
+
+SIZE(mhe_force_ops, 56);
+AT(mhe_force_ops, size, 0);
+AT(mhe_force_ops, create, 8);
+AT(mhe_force_ops, destroy, 16);
+AT(mhe_force_ops, layout, 24);
+AT(mhe_force_ops, evaluate, 32);
+AT(mhe_force_ops, input, 40);
+AT(mhe_force_ops, covers, 48);
+
+SIZE(mhe_system_point, 64);
+AT(mhe_system_point, size, 0);
+AT(mhe_system_point, q, 8);
+AT(mhe_system_point, v, 16);
+AT(mhe_system_point, a, 24);
+AT(mhe_system_point, z, 32);
+AT(mhe_system_point, c, 40);
+AT(mhe_system_point, r, 48);
+AT(mhe_system_point, w, 56);
+
+SIZE(mhe_acceleration, 120);
 AT(mhe_acceleration, size, 0);
 AT(mhe_acceleration, vdot, 8);
 AT(mhe_acceleration, vdot_q, 16);
 AT(mhe_acceleration, vdot_v, 24);
 AT(mhe_acceleration, vdot_a, 32);
 AT(mhe_acceleration, vdot_r, 40);
+AT(mhe_acceleration, vdot_z, 48);
+AT(mhe_acceleration, vdot_p, 56);
+AT(mhe_acceleration, zdot, 64);
+AT(mhe_acceleration, zdot_q, 72);
+AT(mhe_acceleration, zdot_v, 80);
+AT(mhe_acceleration, zdot_a, 88);
+AT(mhe_acceleration, zdot_c, 96);
+AT(mhe_acceleration, zdot_z, 104);
+AT(mhe_acceleration, zdot_p, 112);
 
-SIZE(mhe_system, 56);
+SIZE(mhe_system, 104);
 AT(mhe_system, size, 0);
-AT(mhe_system, n_q, 4);
-AT(mhe_system, n_m, 8);
-AT(mhe_system, n_r, 12);
-AT(mhe_system, n_a, 16);
-AT(mhe_system, n_x, 20);
-AT(mhe_system, n_u, 24);
-AT(mhe_system, data, 32);
-AT(mhe_system, acceleration, 40);
-AT(mhe_system, activation_rate, 48);
+AT(mhe_system, layout, 8);
+AT(mhe_system, n_x, 16);
+AT(mhe_system, n_u, 20);
+AT(mhe_system, n_w, 24);
+AT(mhe_system, n_p, 28);
+AT(mhe_system, n_q, 32);
+AT(mhe_system, n_m, 36);
+AT(mhe_system, n_a, 40);
+AT(mhe_system, n_d, 44);
+AT(mhe_system, n_z, 48);
+AT(mhe_system, n_r, 52);
+AT(mhe_system, n_k, 56);
+AT(mhe_system, z_muscle, 64);
+AT(mhe_system, z_of, 72);
+AT(mhe_system, data, 80);
+AT(mhe_system, acceleration, 88);
+AT(mhe_system, activation_rate, 96);
 
-SIZE(mhe_integrator_ops, 56);
+SIZE(mhe_step_derivatives, 32);
+AT(mhe_step_derivatives, size, 0);
+AT(mhe_step_derivatives, A, 8);
+AT(mhe_step_derivatives, B, 16);
+AT(mhe_step_derivatives, P, 24);
+
+SIZE(mhe_integrator_ops, 64);
 AT(mhe_integrator_ops, size, 0);
 AT(mhe_integrator_ops, create, 8);
 AT(mhe_integrator_ops, destroy, 16);
@@ -419,8 +578,9 @@ AT(mhe_integrator_ops, context_create, 24);
 AT(mhe_integrator_ops, context_destroy, 32);
 AT(mhe_integrator_ops, step, 40);
 AT(mhe_integrator_ops, memory_size, 48);
+AT(mhe_integrator_ops, accepts, 56);
 
-SIZE(mhe_stage_values, 80);
+SIZE(mhe_stage_values, 120);
 AT(mhe_stage_values, size, 0);
 AT(mhe_stage_values, cost, 8);
 AT(mhe_stage_values, grad_x, 16);
@@ -431,8 +591,17 @@ AT(mhe_stage_values, hess_uu, 48);
 AT(mhe_stage_values, x_next, 56);
 AT(mhe_stage_values, A, 64);
 AT(mhe_stage_values, B, 72);
+AT(mhe_stage_values, P, 80);
+AT(mhe_stage_values, grad_p, 88);
+AT(mhe_stage_values, hess_px, 96);
+AT(mhe_stage_values, hess_pu, 104);
+AT(mhe_stage_values, hess_pp, 112);
 
-SIZE(mhe_stage_problem, 112);
+SIZE(mhe_low_rank, 8);
+AT(mhe_low_rank, size, 0);
+AT(mhe_low_rank, n_directions, 4);
+
+SIZE(mhe_stage_problem, 152);
 AT(mhe_stage_problem, size, 0);
 AT(mhe_stage_problem, n_intervals, 4);
 AT(mhe_stage_problem, n_x, 8);
@@ -449,8 +618,13 @@ AT(mhe_stage_problem, ux_pattern, 80);
 AT(mhe_stage_problem, uu_pattern, 88);
 AT(mhe_stage_problem, data, 96);
 AT(mhe_stage_problem, evaluate, 104);
+AT(mhe_stage_problem, n_p, 112);
+AT(mhe_stage_problem, p_lower, 120);
+AT(mhe_stage_problem, p_upper, 128);
+AT(mhe_stage_problem, set_parameters, 136);
+AT(mhe_stage_problem, low_rank, 144);
 
-SIZE(mhe_solution, 64);
+SIZE(mhe_solution, 88);
 AT(mhe_solution, size, 0);
 AT(mhe_solution, has_multipliers, 4);
 AT(mhe_solution, x, 8);
@@ -460,6 +634,19 @@ AT(mhe_solution, zx_lower, 32);
 AT(mhe_solution, zx_upper, 40);
 AT(mhe_solution, zu_lower, 48);
 AT(mhe_solution, zu_upper, 56);
+AT(mhe_solution, p, 64);
+AT(mhe_solution, zp_lower, 72);
+AT(mhe_solution, zp_upper, 80);
+
+SIZE(mhe_covariance, 56);
+AT(mhe_covariance, size, 0);
+AT(mhe_covariance, node, 4);
+AT(mhe_covariance, xx, 8);
+AT(mhe_covariance, ux, 16);
+AT(mhe_covariance, uu, 24);
+AT(mhe_covariance, pp, 32);
+AT(mhe_covariance, px, 40);
+AT(mhe_covariance, pu, 48);
 
 SIZE(mhe_solve_control, 32);
 AT(mhe_solve_control, size, 0);
@@ -476,9 +663,11 @@ AT(mhe_solve_info, kkt_residual, 24);
 AT(mhe_solve_info, primal_residual, 32);
 AT(mhe_solve_info, evaluation_time, 40);
 
-SIZE(mhe_solver_ops, 40);
+SIZE(mhe_solver_ops, 56);
 AT(mhe_solver_ops, size, 0);
 AT(mhe_solver_ops, create, 8);
 AT(mhe_solver_ops, destroy, 16);
 AT(mhe_solver_ops, solve, 24);
 AT(mhe_solver_ops, prepare, 32);
+AT(mhe_solver_ops, accepts, 40);
+AT(mhe_solver_ops, covariance, 48);

@@ -16,8 +16,8 @@ typedef struct refusal {
 
 /* In the order of the folder (by name). */
 static const refusal expected[] = {
-    {"abi_major.so", "built for ABI 1.1, this is ABI 0.1"},
-    {"abi_minor.so", "built for ABI 0.2, this is ABI 0.1"},
+    {"abi_major.so", "built for ABI 1.2, this is ABI 0.2"},
+    {"abi_minor.so", "built for ABI 0.3, this is ABI 0.2"},
     {"create_alone.so", "plugin 'test.cost.abi': one of create() and destroy() is NULL, not both"},
     {"default_out_of_range.so",
      "plugin 'test.cost.abi': option 'gain': the default is out of range"},
@@ -34,14 +34,14 @@ static const refusal expected[] = {
     {"no_version.so", "plugin 'test.cost.abi' has no version"},
     {"not_elf.so", "not a shared object (no ELF header)"},
     {"null_function.so",
-     "plugin 'test.cost.abi': the required function residual() of mhe.cost/1 is NULL"},
+     "plugin 'test.cost.abi': the required function residual() of mhe.cost/2 is NULL"},
     {"null_library.so", "mhe_plugin_entry() returns NULL"},
     {"null_ops.so", "plugin 'test.cost.abi' has no function table"},
     {"null_plugin.so", "an entry of the library table is NULL"},
     {"ops_size.so", "plugin 'test.cost.abi': the function table has a wrong size (2 bytes)"},
     {"option_size.so", "plugin 'test.cost.abi': an option has a wrong size (16 bytes)"},
     {"past_size.so",
-     "plugin 'test.cost.abi': the required function residual() of mhe.cost/1 lies past its size"},
+     "plugin 'test.cost.abi': the required function residual() of mhe.cost/2 lies past its size"},
     {"plugin_size.so", "a plugin's descriptor has a wrong size (8 bytes)"},
     {"throws.so", "mhe_plugin_entry() threw a C++ exception (std::runtime_error)"},
     {"truncated.so", "the file is truncated"},
@@ -91,7 +91,7 @@ static void a_missing_plugin_is_told_with_the_refused_files(void **state) {
     assert_int_equal(mhi_registry_find(*state, "test.cost.abo", NULL, &plugin, &err), MHE_E_PLUGIN);
     assert_null(plugin);
     assert_non_null(strstr(err.text, "did you mean 'test.cost.abi'?"));
-    assert_non_null(strstr(err.text, "abi_major.so: built for ABI 1.1"));
+    assert_non_null(strstr(err.text, "abi_major.so: built for ABI 1.2"));
 }
 
 int main(void) {

@@ -112,9 +112,9 @@ static void run(rig *r, fault harm, outcome *o) {
         (void)squares(e.markers, NULL, n_k);
         const double *q = rec->reference.q + at * n_q, *v = rec->reference.qdot + at * n_q;
         mhi_muscle_state muscles;
-        assert_int_equal(mhi_system_muscles(truth, q, v, rec->reference.activation + at * n_m, 0,
-                                            &muscles, NULL),
-                         MHE_OK);
+        const double *a = rec->reference.activation + at * n_m;
+        const mhe_system_point point = {.size = sizeof point, .q = q, .v = v, .a = a};
+        assert_int_equal(mhi_system_muscles(truth, &point, 0, &muscles, NULL), MHE_OK);
         o->angle[at] = squares(e.q, q, n_q);
         o->force[at] = squares(e.force, muscles.force, n_m);
         o->status[at] = e.status;

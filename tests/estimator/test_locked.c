@@ -28,7 +28,8 @@ static void measure(test_fixture *f, const double *q, const double *v, double *m
         a[i] = 0.3;
     }
     assert_int_equal(mhi_system_markers(context, q, markers, NULL, &f->err), MHE_OK);
-    assert_int_equal(mhi_system_muscles(context, q, v, a, 0, &muscles, &f->err), MHE_OK);
+    const mhe_system_point at = {.size = sizeof at, .q = q, .v = v, .a = a};
+    assert_int_equal(mhi_system_muscles(context, &at, 0, &muscles, &f->err), MHE_OK);
     memcpy(force, muscles.force, sizeof(double) * N_M);
 }
 

@@ -200,12 +200,18 @@ typedef struct acceleration_point {
 } acceleration_point;
 
 /* z = [q v a r] */
+static mhe_system_point point_at(const mhe_system *s, const double *z) {
+    const double *a = z + 2 * s->n_q;
+    return (mhe_system_point){
+        .size = sizeof(mhe_system_point), .q = z, .v = z + s->n_q, .a = a, .r = a + s->n_m};
+}
+
 static int acceleration_value(void *data, const double *z, double *vdot) {
     const acceleration_point *p = data;
     const mhe_system *s = p->system;
     const mhe_acceleration out = {.size = sizeof out, .vdot = vdot};
-    return s->acceleration(s, p->context, z, z + s->n_q, z + 2 * s->n_q, z + 2 * s->n_q + s->n_m,
-                           &out, NULL);
+    const mhe_system_point at = point_at(s, z);
+    return s->acceleration(s, p->context, &at, &out, NULL);
 }
 
 static void put_block(double *to, int32_t width, int32_t column, const double *block, int32_t rows,
@@ -235,8 +241,8 @@ static void accelerations_match_differences(void **state) {
         acceleration_point p = {s, mhi_ocp_context(f.ocp)};
         const mhe_acceleration out = {
             .size = sizeof out, .vdot = vdot, .vdot_q = q, .vdot_v = v, .vdot_a = a, .vdot_r = r};
-        assert_int_equal(
-            s->acceleration(s, p.context, z, z + Q, z + 2 * Q, z + 2 * Q + M, &out, NULL), MHE_OK);
+        const mhe_system_point at = point_at(s, z);
+        assert_int_equal(s->acceleration(s, p.context, &at, &out, NULL), MHE_OK);
         put_block(jacobian, Z, 0, q, Q, Q);
         put_block(jacobian, Z, Q, v, Q, Q);
         put_block(jacobian, Z, 2 * Q, a, Q, M);

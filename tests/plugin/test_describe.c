@@ -35,7 +35,7 @@ static void text_shows_the_whole_table(void **state) {
                                   "A sample of everything.\n"
                                   "\n"
                                   "Reference: doi:10.0000/none\n"
-                                  "Interface: mhe.cost/1\n"
+                                  "Interface: mhe.cost/2\n"
                                   "File:      " PLUGIN_DIR "/first.so\n"
                                   "Extension: mhe.cost.hessian/1\n"
                                   "\n"
@@ -72,7 +72,7 @@ static void markdown_names_no_file_and_keeps_cells_whole(void **state) {
     assert_non_null(strstr(out.data, "Factor by its old name. Deprecated: use gain. |"));
     mhi_text_free(&out);
     out = describe(*state, "test.cost.plain", MHI_FORMAT_MARKDOWN);
-    assert_string_equal(out.data, "`test.cost.plain` (`mhe.cost/1`): No options.\n\nNo options.\n");
+    assert_string_equal(out.data, "`test.cost.plain` (`mhe.cost/2`): No options.\n\nNo options.\n");
     mhi_text_free(&out);
 }
 

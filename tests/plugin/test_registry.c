@@ -172,8 +172,8 @@ static void a_wrong_name_or_kind_is_explained(void **state) {
     assert_int_equal(
         mhi_registry_find(registry, "test.cost.sample", MHE_MUSCLE_IFACE, &plugin, &err),
         MHE_E_PLUGIN);
-    assert_string_equal(err.text, "plugin 'test.cost.sample' is of the kind mhe.cost/1, "
-                                  "here mhe.muscle/1 is wanted");
+    assert_string_equal(err.text, "plugin 'test.cost.sample' is of the kind mhe.cost/2, "
+                                  "here mhe.muscle/2 is wanted");
     mhi_registry_free(registry);
 }
 

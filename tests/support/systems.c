@@ -13,8 +13,9 @@ static void shape(int32_t flags, mhe_system *out) {
     out->n_q = Q;
     out->n_m = M;
     out->n_r = flags & SYSTEM_RESIDUALS ? Q : 0;
-    out->n_a = flags & SYSTEM_EXCITATION ? M : 0;
-    out->n_x = 2 * Q + out->n_a;
+    out->n_a = M;
+    out->n_d = flags & SYSTEM_EXCITATION ? M : 0;
+    out->n_x = 2 * Q + out->n_d;
     out->n_u = M + out->n_r;
 }
 
@@ -47,9 +48,10 @@ static void solve(const double mass[Q][Q], const double *b, int columns, double 
     }
 }
 
-static mhe_status pendulum_acceleration(const mhe_system *system, void *context, const double *q,
-                                        const double *v, const double *a, const double *r,
-                                        const mhe_acceleration *out, mhe_error *err) {
+static mhe_status pendulum_acceleration(const mhe_system *system, void *context,
+                                        const mhe_system_point *at, const mhe_acceleration *out,
+                                        mhe_error *err) {
+    const double *q = at->q, *v = at->v, *a = at->a, *r = at->r;
     (void)context, (void)err;
     double s = sin(q[1]), c = cos(q[1]), s12 = sin(q[0] + q[1]), c12 = cos(q[0] + q[1]);
     double mass[Q][Q] = {{alpha + 2 * beta * c, delta + beta * c}, {delta + beta * c, delta}};
@@ -136,9 +138,10 @@ static const double stiff[Q][Q] = {{90, -20}, {-30, 160}}, damp[Q][Q] = {{6, 1},
 static const double gain[Q][M] = {{50, -30, 10}, {5, 40, -60}};
 static const double tau[M] = {0.009, 0.018, 0.05};
 
-static mhe_status linear_acceleration(const mhe_system *system, void *context, const double *q,
-                                      const double *v, const double *a, const double *r,
-                                      const mhe_acceleration *out, mhe_error *err) {
+static mhe_status linear_acceleration(const mhe_system *system, void *context,
+                                      const mhe_system_point *at, const mhe_acceleration *out,
+                                      mhe_error *err) {
+    const double *q = at->q, *v = at->v, *a = at->a, *r = at->r;
     (void)context, (void)err;
     for (int i = 0; i < Q; i++) {
         out->vdot[i] = system->n_r > 0 ? r[i] : 0;
@@ -199,7 +202,7 @@ void test_linear_matrix(const mhe_system *system, double *out) {
             rate[n_x + M + i] = 1;
         }
     }
-    for (int i = 0; i < system->n_a; i++) {
+    for (int i = 0; i < system->n_d; i++) {
         out[(2 * Q + i) * n + 2 * Q + i] = -1 / tau[i];
         out[(2 * Q + i) * n + n_x + i] = 1 / tau[i];
     }
@@ -235,7 +238,9 @@ void test_integrator_close(struct test_integrator *integrator) {
 void test_integrate(const struct test_integrator *integrator, const double *x, const double *u,
                     double dt, double *x_next, double *A, double *B) {
     mhe_error err = {0};
-    if (integrator->ops->step(integrator->context, x, u, dt, NULL, x_next, A, B, &err) != MHE_OK) {
+    const mhe_step_derivatives out = {.size = sizeof out, .A = A, .B = B};
+    if (integrator->ops->step(integrator->context, x, u, NULL, dt, NULL, x_next, &out, &err) !=
+        MHE_OK) {
         fail_msg("%s", err.text);
     }
 }
@@ -257,7 +262,7 @@ struct step_data {
 static int step_of(void *data, const double *xu, double *y) {
     const struct step_data *d = data;
     const struct test_integrator *i = d->integrator;
-    return i->ops->step(i->context, xu, xu + i->system->n_x, d->dt, NULL, y, NULL, NULL, NULL);
+    return i->ops->step(i->context, xu, xu + i->system->n_x, NULL, d->dt, NULL, y, NULL, NULL);
 }
 
 double test_step_derivatives(const struct test_integrator *integrator, const double *x,

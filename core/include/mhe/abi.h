@@ -19,7 +19,7 @@ extern "C" {
 #define MHE_MAGIC 0x4d484531u /* "MHE1" */
 /* While the major number is 0 the minor number must match too. */
 #define MHE_ABI_MAJOR 0
-#define MHE_ABI_MINOR 1
+#define MHE_ABI_MINOR 2
 
 /* MHE_EXPORT: the entry of a plugin. MHE_API: a function of libmhe.so. */
 #if defined(__GNUC__)

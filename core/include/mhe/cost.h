@@ -24,14 +24,25 @@
 #ifndef MHE_COST_H
 #define MHE_COST_H
 
+#include <mhe/layout.h>
 #include <mhe/plugin.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-#define MHE_COST_IFACE "mhe.cost/1"
+#define MHE_COST_IFACE "mhe.cost/2"
 #define MHE_COST_MAX_SIGNALS 16
+
+/* Which node's value of a signal a cost reads. */
+#define MHE_AT_NODE 0 /* that of the node itself */
+#define MHE_AT_PREVIOUS                                                        \
+    1 /* that of the node before: for rates and smoothness. NaN where there is \
+       * none (the first node of a run) or the signal had no value there. The  \
+       * core carries it along as appended state, only where a cost asks */
+#define MHE_AT_FIRST                                                             \
+    2 /* at the window's first node only, else NaN: for priors on the state that \
+       * the window begins with */
 
 #define MHE_FORMULATION_EXCITATION 0 /* muscle controls are excitations; activations are states */
 #define MHE_FORMULATION_ACTIVATION 1 /* muscle controls are activations */
@@ -54,6 +65,10 @@ struct mhe_problem {
      */
     int32_t (*find_signal)(const mhe_problem *problem, const char *name, int32_t *n_y,
                            const char **unit);
+    /* Names of a signal's entries [n_y] (coordinates, muscles, "STER.x"); NULL: no such signal.
+     * [any] */
+    const char *const *(*entry_names)(const mhe_problem *problem, int32_t signal);
+    const mhe_layout *layout; /* states, controls, inputs, parameters of the system */
 };
 
 /* Shape of J: dense [n_res x ny], row-major; or, where n_res = ny and r_i depends on y_i alone, its
@@ -67,11 +82,12 @@ typedef struct mhe_cost_layout {
     int32_t signal;    /* the one signal read, where n_signals is left 0 */
     int32_t n_signals; /* several: y is their concatenation in this order; repeats are fine */
     int32_t signals[MHE_COST_MAX_SIGNALS];
-    int32_t n_res;          /* number of residuals */
-    int32_t jacobian;       /* MHE_JACOBIAN_* */
-    uint32_t scratch_bytes; /* wanted in stage->scratch */
-    const char *res_unit;   /* unit of r, "1" if mixed */
-    int32_t fills_missing;  /* 1: r can be finite where y_ref is NaN */
+    int32_t at[MHE_COST_MAX_SIGNALS]; /* MHE_AT_*, of each of them */
+    int32_t n_res;                    /* number of residuals */
+    int32_t jacobian;                 /* MHE_JACOBIAN_* */
+    uint32_t scratch_bytes;           /* wanted in stage->scratch */
+    const char *res_unit;             /* unit of r, "1" if mixed */
+    int32_t fills_missing;            /* 1: r can be finite where y_ref is NaN */
 } mhe_cost_layout;
 
 /* One node as a cost sees it. All arrays are lent for the call. */

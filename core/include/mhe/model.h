@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* model.h: interface of skeleton plugins (kind "model").
  *
- * A model turns a description into kinematics and dynamics of a tree of rigid bodies, musculotendon
- * paths and markers. It knows no muscle force and no cost. n_q, n_m (muscles) and n_k (markers) are
- * those of the description. Equation of motion: M(q) vdot + bias(q, v) = tau. */
+ * A model turns a description into kinematics and dynamics of a tree of rigid bodies, lengths of
+ * paths and positions of markers. It knows no muscle force and no cost. n_q (free coordinates), n_b
+ * (bodies), n_p (paths, the muscles' first) and n_k (markers) are those of the description.
+ * Equation of motion: M(q) vdot + bias(q, v) = tau. Loops of the description are open here: what
+ * closes them is a force. */
 #ifndef MHE_MODEL_H
 #define MHE_MODEL_H
 
@@ -14,7 +16,7 @@
 extern "C" {
 #endif
 
-#define MHE_MODEL_IFACE "mhe.model/1"
+#define MHE_MODEL_IFACE "mhe.model/2"
 
 /* What kinematics() is to compute at (q, v). NULL: not wanted. The arrays are the caller's. All
  * derivatives exact. */
@@ -22,12 +24,24 @@ typedef struct mhe_kinematics {
     uint32_t size;
     double *mass;      /* M [n_q x n_q], symmetric, kg m^2 (or kg, kg m) */
     double *bias;      /* [n_q]: Coriolis, centrifugal and gravity terms, N m (or N) */
-    double *length;    /* musculotendon lengths [n_m], m */
-    double *length_q;  /* dL/dq [n_m x n_q], row-major, m/rad; the moment arm is its negative */
-    double *length_qq; /* d2L/dq2 [n_m x n_q x n_q], row-major */
+    double *length;    /* of paths [n_p], m */
+    double *length_q;  /* dL/dq [n_p x n_q], row-major, m/rad; the moment arm is its negative */
+    double *length_qq; /* d2L/dq2 [n_p x n_q x n_q], row-major */
     double *marker;    /* positions in ground [n_k x 3], m */
     double *marker_q;  /* d marker/dq [3 n_k x n_q], row-major */
+    double *body;   /* [n_b x 12]: origin in ground (m), then the rotation, body to ground, row by
+                     * row */
+    double *body_q; /* [n_b x 6 x n_q]: angular velocity and velocity of the body's origin, in
+                     * ground axes, per unit of each coordinate's rate */
+    double *dependent; /* values of the dependent coordinates [n_dependents], rad (m) */
 } mhe_kinematics;
+
+/* A force at a point and a torque that act on a body. `axes`: the body in whose axes force and
+ * torque are given; `origin`: the body in whose frame (axes and origin) the point is; -1: ground.
+ */
+typedef struct mhe_load {
+    int32_t body, axes, origin;
+} mhe_load;
 
 typedef struct mhe_model_ops {
     uint32_t size;
@@ -49,6 +63,17 @@ typedef struct mhe_model_ops {
                                    double *tau_v, mhe_error *err);
     /* vdot [n_q] = M^-1 (tau - bias) at the state of the last kinematics() call. [hot] */
     mhe_status (*forward_dynamics)(void *context, const double *tau, double *vdot, mhe_error *err);
+    /* Generalised force tau [n_q] of n loads at the state of the last kinematics() call, added to
+     * what stands in tau; `value` [n x 9]: force, point, torque. tau_q [n_q x n_q] (added too) and
+     * tau_l [n_q x 9 n] (set) may be NULL. [hot] */
+    mhe_status (*loads)(void *context, const mhe_load *loads, int32_t n, const double *value,
+                        double *tau, double *tau_q, double *tau_l, mhe_error *err);
+    /* Which coordinates a path can depend on: pattern [n_p x n_q], 1 or 0. [cold] */
+    mhe_status (*path_pattern)(const void *self, uint8_t *pattern, mhe_error *err);
+    /* Points of the path `path` as it runs now, [at most n x 3] in ground, for drawing: path points
+     * that are on, and points along what it wraps around. Returns their number, which may be
+     * larger than n. At the state of the last kinematics() call. [hot] */
+    int32_t (*path_points)(void *context, int32_t path, double *points, int32_t n);
 } mhe_model_ops;
 
 #ifdef __cplusplus

@@ -7,6 +7,9 @@
  *     subject to  x_{k+1} = F_k(x_k, u_k)
  *                 x_lower_k <= x_k <= x_upper_k,   u_lower_k <= u_k <= u_upper_k
  *
+ * F_k and l_k may depend on global parameters p [n_p], constant over the nodes, with bounds of
+ * their own; where n_p > 0 they are variables too. A solver without them says so (accepts()).
+ *
  * Each l_k is half a weighted sum of squares. A variable is fixed where its bounds are equal (the
  * first state of a moving horizon). Lagrangian and signs, with w all x and u:
  *
@@ -22,7 +25,7 @@
 extern "C" {
 #endif
 
-#define MHE_SOLVER_IFACE "mhe.solver/1"
+#define MHE_SOLVER_IFACE "mhe.solver/2"
 
 /* What evaluate() is to compute at node k; NULL: not wanted. Matrices row-major. At the last node u
  * is NULL and the entries for u and the dynamics are not touched. */
@@ -37,7 +40,20 @@ typedef struct mhe_stage_values {
     double *x_next;  /* [n_x] F_k(x_k, u_k) */
     double *A;       /* dF/dx [n_x x n_x]; A and B both or neither, and only with x_next */
     double *B;       /* dF/du [n_x x n_u] */
+    double *P;       /* dF/dp [n_x x n_p]; only with A and B */
+    double *grad_p;  /* [n_p] */
+    double *hess_px; /* [n_p x n_x] */
+    double *hess_pu; /* [n_p x n_u] */
+    double *hess_pp; /* [n_p x n_p] */
 } mhe_stage_values;
+
+/* Told where B = D + C V^T at every node: D has at most one entry a column, n_directions is the
+ * number of columns of C (controls that reach the state through few directions: many muscles, few
+ * joints). A solver may use it and may ignore it. */
+typedef struct mhe_low_rank {
+    uint32_t size;
+    int32_t n_directions;
+} mhe_low_rank;
 
 typedef struct mhe_stage_problem mhe_stage_problem;
 struct mhe_stage_problem {
@@ -58,6 +74,12 @@ struct mhe_stage_problem {
     mhe_status (*evaluate)(const mhe_stage_problem *problem, int32_t worker, int32_t k,
                            const double *x, const double *u, const mhe_stage_values *out,
                            mhe_error *err);
+    int32_t n_p;                     /* global parameters */
+    const double *p_lower, *p_upper; /* [n_p] */
+    /* Sets the parameters [n_p] of all later evaluations. Not while evaluations run. NULL where n_p
+     * = 0. [cold] */
+    mhe_status (*set_parameters)(const mhe_stage_problem *problem, const double *p, mhe_error *err);
+    const mhe_low_rank *low_rank; /* NULL: nothing is known of B beyond its pattern */
 };
 
 /* Iterate, in: start, out: result. All arrays the caller's. */
@@ -69,7 +91,22 @@ typedef struct mhe_solution {
     double *lambda;              /* [N x n_x], of x_{k+1} - F_k = 0 */
     double *zx_lower, *zx_upper; /* [(N+1) x n_x], >= 0 */
     double *zu_lower, *zu_upper; /* [N x n_u], >= 0 */
+    double *p;                   /* [n_p] */
+    double *zp_lower, *zp_upper; /* [n_p], >= 0 */
 } mhe_solution;
+
+/* Blocks of the covariance of the solution, (Gauss-Newton Hessian)^-1 on the equality constraints
+ * and on what is not at a bound, at the last solve()'s result. NULL: not wanted. */
+typedef struct mhe_covariance {
+    uint32_t size;
+    int32_t node; /* 0 .. N */
+    double *xx;   /* [n_x x n_x] of x_node */
+    double *ux;   /* [n_u x n_x]; node < N */
+    double *uu;   /* [n_u x n_u] */
+    double *pp;   /* [n_p x n_p] */
+    double *px;   /* [n_p x n_x] */
+    double *pu;   /* [n_p x n_u] */
+} mhe_covariance;
 
 #define MHE_SOLVE_CONVERGED 0
 #define MHE_SOLVE_ITERATION_LIMIT 1
@@ -115,6 +152,12 @@ typedef struct mhe_solver_ops {
      * is the same. So the time from a measurement to its estimate holds costs and steps only. A
      * point without values is no error: solve() will meet it. [hot] */
     mhe_status (*prepare)(void *self, const mhe_solution *start, mhe_error *err);
+    /* May be NULL: it takes problems without parameters only. Why it cannot solve this kind of
+     * problem, asked before create(): a sentence in err and a negative status. [cold] */
+    mhe_status (*accepts)(const mhe_stage_problem *problem, const void *config, mhe_error *err);
+    /* May be NULL: none can be had. Fills the blocks asked for. MHE_E_NUMERIC: the Hessian is
+     * singular there. [cold] */
+    mhe_status (*covariance)(void *self, const mhe_covariance *out, mhe_error *err);
 } mhe_solver_ops;
 
 #ifdef __cplusplus

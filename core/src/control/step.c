@@ -67,13 +67,13 @@ static void general_bounds(const mhi_step_work *w, int32_t k) {
         lower[f->n_q + i] = -b->velocity_max;
         upper[f->n_q + i] = b->velocity_max;
     }
-    for (int32_t i = 0; i < f->n_a; i++) {
+    for (int32_t i = 0; i < f->n_d; i++) {
         lower[2 * f->n_q + i] = b->activation_min;
         upper[2 * f->n_q + i] = b->activation_max;
     }
     for (int32_t i = 0; i < f->n_u && k < w->step->intervals; i++) {
-        const double low = f->n_a > 0 ? b->excitation_min : b->activation_min;
-        const double high = f->n_a > 0 ? b->excitation_max : b->activation_max;
+        const double low = f->n_d > 0 ? b->excitation_min : b->activation_min;
+        const double high = f->n_d > 0 ? b->excitation_max : b->activation_max;
         mhi_ocp_u_lower(w->ocp, k)[i] = i < f->n_m ? low : -b->residual_torque_max;
         mhi_ocp_u_upper(w->ocp, k)[i] = i < f->n_m ? high : b->residual_torque_max;
     }
@@ -214,7 +214,7 @@ static mhe_status start_anew(const mhi_step_work *w, mhi_trajectory *t, mhe_erro
             x[i] = from + (to - from) * way;
             x[n_q + i] = (to - from) * speed;
         }
-        for (int32_t i = 0; i < w->face->n_a; i++) {
+        for (int32_t i = 0; i < w->face->n_d; i++) {
             x[2 * n_q + i] = START_EFFORT;
         }
         for (int32_t i = 0; i < w->face->n_m && k < t->n; i++) {

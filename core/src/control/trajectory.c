@@ -48,7 +48,7 @@ double mhi_trajectory_duration(const mhi_trajectory *const *motions, int32_t n_m
 }
 
 int32_t mhi_part_find(const mhe_system *f, const char *name, mhi_part *part) {
-    const int driven = f->n_a > 0;
+    const int driven = f->n_d > 0;
     const struct {
         const char *name;
         mhi_part part;

@@ -119,7 +119,8 @@ mhe_status mhi_errors_add(mhi_errors *e, const mhe_estimate *s, mhe_error *err) 
     mhi_muscle_state muscles;
     const int known = !any_nan(q, e->n_q); /* a reference may end before the markers do */
     if (known && any_nan(force, e->n_m) && !any_nan(v, e->n_q) && !any_nan(a, e->n_m)) {
-        status = mhi_system_muscles(e->context, q, v, a, 0, &muscles, err);
+        const mhe_system_point at = {.size = sizeof at, .q = q, .v = v, .a = a};
+        status = mhi_system_muscles(e->context, &at, 0, &muscles, err);
         force = muscles.force;
     }
     compare(e, Q, s->q, q, row);

@@ -93,7 +93,7 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
     mhi_output *o = &e->output;
     const double *x = mhi_row(e->window.solution.x, k, e->n_x);
     const double *u = mhi_row(e->window.solution.u, controls, e->n_u);
-    const double *a = e->n_x > 2 * e->n_q ? x + 2 * e->n_q : u;
+    const double *a = mhi_system_activation(e->system, x, u);
     const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;
     memcpy(o->q, x, n_q);
     memcpy(o->v, x + e->n_q, n_q);
@@ -102,7 +102,9 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
     memcpy(o->residual, u + e->n_m, sizeof(double) * (size_t)e->n_r);
     mhi_muscle_state muscles;
     mhi_system_context *context = mhi_ocp_context(e->ocp);
-    mhe_status status = mhi_system_muscles(context, x, x + e->n_q, a, 0, &muscles, err);
+    mhe_system_point at;
+    mhi_system_point(e->system, x, u, NULL, &at);
+    mhe_status status = mhi_system_muscles(context, &at, 0, &muscles, err);
     if (status == MHE_OK) {
         memcpy(o->force, muscles.force, n_m);
         memcpy(o->moment, muscles.moment, n_q);

@@ -1,95 +1,170 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "model/system.h"
-
-#include "base/arena.h"
+/* system.c: accelerations, rates and muscle forces with their derivatives. */
 #include "base/cholesky.h"
-#include "plugin/instance.h"
+#include "model/system_private.h"
 
-#include <math.h>
 #include <string.h>
 
-struct mhi_system {
-    mhe_system face;
-    const mhe_description *description;
-    int32_t formulation;
-    const mhe_model_ops *model;
-    const mhe_muscle_ops *muscle;
-    void *model_self, *muscle_self;
-    mhi_arena arena;
-};
+static size_t doubles(int32_t n) {
+    return sizeof(double) * (size_t)n;
+}
 
-struct mhi_system_context {
-    const mhi_system *system;
-    void *model;
-    int32_t n_q, n_m;
-    double *zero;                                /* [n_q] */
-    double *mass, *bias;                         /* [n_q x n_q], [n_q] */
-    double *length, *length_q, *length_qq;       /* [n_m], [n_m x n_q], [n_m x n_q x n_q] */
-    double *velocity;                            /* [n_m] */
-    double *force, *force_a, *force_l, *force_w; /* [n_m] */
-    double *force_q, *force_v;                   /* [n_m x n_q] */
-    double *moment, *moment_q, *moment_v;        /* [n_q], [n_q x n_q] */
-    double *tau_q, *tau_v;                       /* [n_q x n_q] */
-    mhi_arena arena;
-};
+/* ---- paths ---- */
 
-/* Ldot, forces and moments from the kinematics in the context; with derivatives if asked. */
-static mhe_status muscles(mhi_system_context *c, const double *v, const double *a,
-                          int32_t derivatives, mhe_error *err) {
+/* Ldot = L_q v of the paths first .. end - 1; with derivatives also dLdot/dq = L_qq v. */
+static void path_velocities(mhi_system_context *c, int32_t from, int32_t to, const double *v,
+                            int32_t derivatives) {
     const mhi_system *s = c->system;
-    const int32_t n_q = c->n_q, n_m = c->n_m;
-    for (int32_t m = 0; m < n_m; m++) {
+    const int32_t n_q = s->face.n_q;
+    for (int32_t m = from; m < to; m++) {
+        const int32_t first = s->first[m], end = s->end[m];
+        const double *l_q = c->length_q + m * n_q;
         double sum = 0;
-        for (int32_t j = 0; j < n_q; j++) {
-            sum += c->length_q[m * n_q + j] * v[j];
+        for (int32_t j = first; j < end; j++) {
+            sum += l_q[j] * v[j];
         }
         c->velocity[m] = sum;
+        for (int32_t i = first; i < end && derivatives; i++) {
+            const double *l_qq = c->length_qq + (m * n_q + i) * n_q;
+            double w_q = 0;
+            for (int32_t j = first; j < end; j++) {
+                w_q += l_qq[j] * v[j];
+            }
+            c->velocity_q[m * n_q + i] = w_q;
+        }
     }
-    mhe_muscle_force out = {.size = sizeof out, .force = c->force};
+}
+
+void mhi_path_moment(const mhi_system_context *c, int32_t m, double force, double *moment) {
+    const mhi_system *s = c->system;
+    const double *l_q = c->length_q + m * s->face.n_q;
+    for (int32_t j = s->first[m]; j < s->end[m]; j++) {
+        moment[j] -= l_q[j] * force;
+    }
+}
+
+/* dF/dq = F_l L_q + F_w dLdot/dq,  dF/dv = F_w L_q,
+ * d moment/dq = -(L_qq F + L_q^T dF/dq),  d moment/dv = -L_q^T dF/dv. */
+void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t m, double force,
+                                 double force_l, double force_w, double *f_q, double *f_v,
+                                 double *moment_q, double *moment_v) {
+    const mhi_system *s = c->system;
+    const int32_t n_q = s->face.n_q, first = s->first[m], end = s->end[m];
+    const double *l_q = c->length_q + m * n_q, *l_qq = c->length_qq + m * n_q * n_q;
+    const double *w_q = c->velocity_q + m * n_q;
+    for (int32_t i = first; i < end; i++) {
+        f_q[i] = force_l * l_q[i] + force_w * w_q[i];
+        f_v[i] = force_w * l_q[i];
+    }
+    for (int32_t i = first; i < end; i++) {
+        for (int32_t j = first; j < end; j++) {
+            moment_q[i * n_q + j] -= force * l_qq[i * n_q + j] + l_q[i] * f_q[j];
+            moment_v[i * n_q + j] -= l_q[i] * f_v[j];
+        }
+    }
+}
+
+/* ---- muscles ---- */
+
+/* The muscles' states as their plugin wants them: [n_s x n_m]. */
+static const double *muscle_state(mhi_system_context *c, const double *a, const double *z) {
+    const mhi_system *s = c->system;
+    const int32_t n_m = s->face.n_m;
+    if (s->n_s == 1) {
+        return s->face.n_a > 0 ? a : z;
+    }
+    if (s->face.n_a > 0) {
+        memcpy(c->state + s->activation * n_m, a, doubles(n_m));
+    }
+    for (int32_t i = 0; i < s->face.n_z; i++) {
+        c->state[s->z_state[i] * n_m + s->face.z_muscle[i]] = z[i];
+    }
+    return c->state;
+}
+
+/* Ldot, forces and moments from the kinematics in the context; with derivatives, and the rates of
+ * all states, if asked. */
+static mhe_status muscles(mhi_system_context *c, const mhe_system_point *at, int32_t derivatives,
+                          int32_t rates, mhe_error *err) {
+    const mhi_system *s = c->system;
+    const int32_t n_q = s->face.n_q, n_m = s->face.n_m;
+    path_velocities(c, 0, n_m, at->v, derivatives);
+    const mhe_muscle_point point = {.size = sizeof point,
+                                    .excitation = at->c,
+                                    .state = muscle_state(c, at->a, at->z),
+                                    .length = c->length,
+                                    .velocity = c->velocity};
+    mhe_muscle_values out = {.size = sizeof out, .force = c->force};
     if (derivatives) {
-        out.force_a = c->force_a;
+        out.force_s = c->force_s;
         out.force_l = c->force_l;
         out.force_w = c->force_w;
     }
-    mhe_status status = s->muscle->force(s->muscle_self, a, c->length, c->velocity, &out, err);
+    if (rates) {
+        out.rate = c->rate;
+    }
+    if (rates && derivatives) {
+        out.rate_e = c->rate_e;
+        out.rate_s = c->rate_s;
+        out.rate_l = c->rate_l;
+        out.rate_w = c->rate_w;
+    }
+    mhe_status status = s->muscle->evaluate(s->muscle_self, &point, &out, err);
     if (status != MHE_OK) {
         return status;
     }
-    memset(c->moment, 0, sizeof(double) * (size_t)n_q);
+    memset(c->moment, 0, doubles(n_q));
     for (int32_t m = 0; m < n_m; m++) {
-        for (int32_t j = 0; j < n_q; j++) {
-            c->moment[j] -= c->length_q[m * n_q + j] * c->force[m];
-        }
+        mhi_path_moment(c, m, c->force[m], c->moment);
     }
     return MHE_OK;
 }
 
-/* dF/dq = F_l L_q + F_w dLdot/dq with dLdot/dq = L_qq v,  dF/dv = F_w L_q,
- * d moment/dq = -(L_qq F + L_q^T dF/dq),  d moment/dv = -L_q^T dF/dv. */
-static void muscle_derivatives(mhi_system_context *c, const double *v) {
-    const int32_t n_q = c->n_q, n_m = c->n_m;
-    memset(c->moment_q, 0, sizeof(double) * (size_t)(n_q * n_q));
-    memset(c->moment_v, 0, sizeof(double) * (size_t)(n_q * n_q));
+static void muscle_derivatives(mhi_system_context *c) {
+    const mhi_system *s = c->system;
+    const int32_t n_q = s->face.n_q, n_m = s->face.n_m;
+    memset(c->moment_q, 0, doubles(n_q * n_q));
+    memset(c->moment_v, 0, doubles(n_q * n_q));
     for (int32_t m = 0; m < n_m; m++) {
-        const double *l_q = c->length_q + m * n_q;
-        const double *l_qq = c->length_qq + m * n_q * n_q;
-        double *f_q = c->force_q + m * n_q, *f_v = c->force_v + m * n_q;
-        for (int32_t i = 0; i < n_q; i++) {
-            double w_q = 0;
-            for (int32_t j = 0; j < n_q; j++) {
-                w_q += l_qq[i * n_q + j] * v[j];
-            }
-            f_q[i] = c->force_l[m] * l_q[i] + c->force_w[m] * w_q;
-            f_v[i] = c->force_w[m] * l_q[i];
+        mhi_path_moment_derivatives(c, m, c->force[m], c->force_l[m], c->force_w[m],
+                                    c->force_q + m * n_q, c->force_v + m * n_q, c->moment_q,
+                                    c->moment_v);
+    }
+    for (int32_t i = 0; i < s->face.n_z; i++) {
+        c->force_z[i] = c->force_s[s->z_state[i] * n_m + s->face.z_muscle[i]];
+    }
+}
+
+/* Rates of z and their derivatives out of those of all states. */
+static void state_rates(const mhi_system_context *c, const mhe_acceleration *out) {
+    const mhi_system *s = c->system;
+    const mhe_system *f = &s->face;
+    const int32_t n_q = f->n_q, n_m = f->n_m;
+    for (int32_t i = 0; i < f->n_z; i++) {
+        const int32_t m = f->z_muscle[i], k = s->z_state[i], at = k * n_m + m;
+        const double *l_q = c->length_q + m * n_q, *w_q = c->velocity_q + m * n_q;
+        out->zdot[i] = c->rate[at];
+        for (int32_t j = 0; j < n_q && out->zdot_q != NULL; j++) {
+            out->zdot_q[i * n_q + j] = c->rate_l[at] * l_q[j] + c->rate_w[at] * w_q[j];
         }
-        for (int32_t i = 0; i < n_q; i++) {
-            for (int32_t j = 0; j < n_q; j++) {
-                c->moment_q[i * n_q + j] -= c->force[m] * l_qq[i * n_q + j] + l_q[i] * f_q[j];
-                c->moment_v[i * n_q + j] -= l_q[i] * f_v[j];
-            }
+        for (int32_t j = 0; j < n_q && out->zdot_v != NULL; j++) {
+            out->zdot_v[i * n_q + j] = c->rate_w[at] * l_q[j];
+        }
+        if (out->zdot_a != NULL && f->n_a > 0) {
+            out->zdot_a[i] = c->rate_s[(k * s->n_s + s->activation) * n_m + m];
+        }
+        if (out->zdot_c != NULL) {
+            out->zdot_c[i] = c->rate_e[at];
+        }
+        for (int32_t j = 0; j < f->n_k && out->zdot_z != NULL; j++) {
+            const int32_t other = f->z_of[m * f->n_k + j];
+            out->zdot_z[i * f->n_k + j] =
+                other < 0 ? 0 : c->rate_s[(k * s->n_s + s->z_state[other]) * n_m + m];
         }
     }
 }
+
+/* ---- accelerations ---- */
 
 static mhe_status kinematics(mhi_system_context *c, const double *q, const double *v,
                              int32_t dynamics, int32_t derivatives, mhe_error *err) {
@@ -102,26 +177,84 @@ static mhe_status kinematics(mhi_system_context *c, const double *q, const doubl
     return c->system->model->kinematics(c->model, q, v, &out, err);
 }
 
-/* out = M^-1 (moment' - tau') with the factor of M in place */
+/* out = M^-1 (moment' + other' - tau') with the factor of M in place */
 static void acceleration_derivative(const mhi_system_context *c, const double *moment_d,
-                                    const double *tau_d, double *out) {
-    const int32_t n_q = c->n_q;
+                                    const double *other_d, const double *tau_d, double *out) {
+    const int32_t n_q = c->system->face.n_q;
     for (int32_t i = 0; i < n_q * n_q; i++) {
         out[i] = moment_d[i] - tau_d[i];
+    }
+    for (int32_t i = 0; i < n_q * n_q && c->system->n_forces > 0; i++) {
+        out[i] += other_d[i];
     }
     mhi_cholesky_solve(c->mass, n_q, out, n_q);
 }
 
-static mhe_status acceleration(const mhe_system *face, void *context, const double *q,
-                               const double *v, const double *a, const double *r,
-                               const mhe_acceleration *out, mhe_error *err) {
+/* out [n_q x n] = -M^-1 L_q^T diag(by), column k that of the muscle `muscle[k]`, NULL: k */
+static void acceleration_by_force(const mhi_system_context *c, const double *by,
+                                  const int32_t *muscle, int32_t n, double *out) {
+    const int32_t n_q = c->system->face.n_q;
+    for (int32_t i = 0; i < n_q; i++) {
+        for (int32_t k = 0; k < n; k++) {
+            const int32_t m = muscle == NULL ? k : muscle[k];
+            out[i * n + k] = -c->length_q[m * n_q + i] * by[k];
+        }
+    }
+    mhi_cholesky_solve(c->mass, n_q, out, n);
+}
+
+static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acceleration *out,
+                                           mhe_error *err) {
+    const mhi_system *s = c->system;
+    const mhe_system *f = &s->face;
+    const int32_t n_q = f->n_q, n_m = f->n_m;
+    /* With tau held, vdot' = M^-1 (moment' - dID/d.(q, v, vdot)): differentiate ID(q, v, vdot) =
+     * tau. */
+    mhe_status status =
+        s->model->inverse_dynamics(c->model, out->vdot, NULL, c->tau_q, c->tau_v, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    muscle_derivatives(c);
+    if (out->vdot_q != NULL) {
+        acceleration_derivative(c, c->moment_q, c->other_q, c->tau_q, out->vdot_q);
+    }
+    if (out->vdot_v != NULL) {
+        acceleration_derivative(c, c->moment_v, c->other_v, c->tau_v, out->vdot_v);
+    }
+    if (out->vdot_a != NULL && f->n_a > 0) {
+        acceleration_by_force(c, c->force_s + s->activation * n_m, NULL, n_m, out->vdot_a);
+    }
+    if (out->vdot_z != NULL && f->n_z > 0) {
+        acceleration_by_force(c, c->force_z, f->z_muscle, f->n_z, out->vdot_z);
+    }
+    if (out->vdot_r != NULL && f->n_r > 0) {
+        memset(out->vdot_r, 0, doubles(n_q * f->n_r));
+        for (int32_t i = 0; i < n_q; i++) {
+            out->vdot_r[i * f->n_r + i] = 1;
+        }
+        mhi_cholesky_solve(c->mass, n_q, out->vdot_r, f->n_r);
+    }
+    return MHE_OK;
+}
+
+mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
+                                   const mhe_system_point *at, const mhe_acceleration *out,
+                                   mhe_error *err) {
     mhi_system_context *c = context;
-    const int32_t n_q = face->n_q, n_m = face->n_m;
+    const int32_t n_q = face->n_q, rates = face->n_z > 0 && out->zdot != NULL;
     const int32_t derivatives =
-        out->vdot_q != NULL || out->vdot_v != NULL || out->vdot_a != NULL || out->vdot_r != NULL;
-    mhe_status status = kinematics(c, q, v, 1, derivatives, err);
+        out->vdot_q != NULL || out->vdot_v != NULL || out->vdot_a != NULL || out->vdot_r != NULL ||
+        out->vdot_z != NULL ||
+        (rates && (out->zdot_q != NULL || out->zdot_v != NULL || out->zdot_a != NULL ||
+                   out->zdot_c != NULL || out->zdot_z != NULL));
+    mhe_status status = kinematics(c, at->q, at->v, 1, derivatives, err);
     if (status == MHE_OK) {
-        status = muscles(c, v, a, derivatives, err);
+        status = muscles(c, at, derivatives, rates, err);
+    }
+    if (status == MHE_OK && c->system->n_forces > 0) {
+        path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
+        status = mhi_forces_evaluate(c, at, derivatives, err);
     }
     if (status != MHE_OK) {
         return status;
@@ -130,61 +263,40 @@ static mhe_status acceleration(const mhe_system *face, void *context, const doub
         return mhe_fail(err, MHE_RETRY, "the mass matrix is singular at this posture");
     }
     for (int32_t i = 0; i < n_q; i++) {
-        out->vdot[i] = c->moment[i] - c->bias[i] + (face->n_r > 0 ? r[i] : 0.0);
+        out->vdot[i] = c->moment[i] - c->bias[i] + (face->n_r > 0 ? at->r[i] : 0.0);
+    }
+    for (int32_t i = 0; i < n_q && c->system->n_forces > 0; i++) {
+        out->vdot[i] += c->other[i];
     }
     mhi_cholesky_solve(c->mass, n_q, out->vdot, 1);
-    if (!derivatives) {
-        return MHE_OK;
+    if (rates) {
+        state_rates(c, out);
     }
-    /* With tau held, vdot' = M^-1 (moment' - dID/d.(q, v, vdot)): differentiate ID(q, v, vdot) =
-     * tau. */
-    status = c->system->model->inverse_dynamics(c->model, out->vdot, NULL, c->tau_q, c->tau_v, err);
-    if (status != MHE_OK) {
-        return status;
-    }
-    muscle_derivatives(c, v);
-    if (out->vdot_q != NULL) {
-        acceleration_derivative(c, c->moment_q, c->tau_q, out->vdot_q);
-    }
-    if (out->vdot_v != NULL) {
-        acceleration_derivative(c, c->moment_v, c->tau_v, out->vdot_v);
-    }
-    if (out->vdot_a != NULL) {
-        for (int32_t i = 0; i < n_q; i++) {
-            for (int32_t m = 0; m < n_m; m++) {
-                out->vdot_a[i * n_m + m] = -c->length_q[m * n_q + i] * c->force_a[m];
-            }
-        }
-        mhi_cholesky_solve(c->mass, n_q, out->vdot_a, n_m);
-    }
-    if (out->vdot_r != NULL && face->n_r > 0) {
-        memset(out->vdot_r, 0, sizeof(double) * (size_t)(n_q * n_q));
-        for (int32_t i = 0; i < n_q; i++) {
-            out->vdot_r[i * n_q + i] = 1;
-        }
-        mhi_cholesky_solve(c->mass, n_q, out->vdot_r, n_q);
-    }
-    return MHE_OK;
+    return derivatives ? acceleration_derivatives(c, out, err) : MHE_OK;
 }
 
-static mhe_status activation_rate(const mhe_system *face, const double *e, const double *a,
-                                  double *rate, double *rate_e, double *rate_a, mhe_error *err) {
+mhe_status mhi_system_activation_rate(const mhe_system *face, const double *control,
+                                      const double *d, double *rate, double *rate_c, double *rate_d,
+                                      mhe_error *err) {
     const mhi_system *s = face->data;
-    return s->muscle->activation_rate(s->muscle_self, e, a, rate, rate_e, rate_a, err);
+    return s->muscle->diagonal_rate(s->muscle_self, s->activation, control, d, rate, rate_c, rate_d,
+                                    err);
 }
 
-mhe_status mhi_system_muscles(mhi_system_context *c, const double *q, const double *v,
-                              const double *a, int32_t derivatives, mhi_muscle_state *out,
-                              mhe_error *err) {
-    mhe_status status = kinematics(c, q, v, 0, derivatives, err);
+/* ---- outside of the integrators ---- */
+
+mhe_status mhi_system_muscles(mhi_system_context *c, const mhe_system_point *at,
+                              int32_t derivatives, mhi_muscle_state *out, mhe_error *err) {
+    const mhi_system *s = c->system;
+    mhe_status status = kinematics(c, at->q, at->v, 0, derivatives, err);
     if (status == MHE_OK) {
-        status = muscles(c, v, a, derivatives, err);
+        status = muscles(c, at, derivatives, 0, err);
     }
     if (status != MHE_OK) {
         return status;
     }
     if (derivatives) {
-        muscle_derivatives(c, v);
+        muscle_derivatives(c);
     }
     *out = (mhi_muscle_state){.length = c->length,
                               .length_q = c->length_q,
@@ -192,11 +304,38 @@ mhe_status mhi_system_muscles(mhi_system_context *c, const double *q, const doub
                               .force = c->force,
                               .force_q = c->force_q,
                               .force_v = c->force_v,
-                              .force_a = c->force_a,
+                              .force_a = c->force_s + s->activation * s->face.n_m,
+                              .force_z = c->force_z,
                               .moment = c->moment,
                               .moment_q = c->moment_q,
                               .moment_v = c->moment_v};
     return MHE_OK;
+}
+
+mhe_status mhi_system_equilibrium(mhi_system_context *c, const double *q, const double *v,
+                                  const double *activation, double *x, mhe_error *err) {
+    const mhi_system *s = c->system;
+    const mhe_system *f = &s->face;
+    double *d = x + f->n_x - f->n_z - f->n_d, *z = x + f->n_x - f->n_z;
+    if (f->n_d > 0) {
+        memcpy(d, activation, doubles(f->n_d));
+    }
+    if (f->n_z == 0) {
+        return MHE_OK;
+    }
+    mhe_status status = kinematics(c, q, v, 0, 0, err);
+    if (status == MHE_OK) {
+        path_velocities(c, 0, f->n_m, v, 0);
+        memcpy(c->state + s->activation * f->n_m, activation, doubles(f->n_m));
+    }
+    if (status == MHE_OK && s->n_s > 1) {
+        status = s->muscle->equilibrium(s->muscle_self, activation, c->length, c->velocity,
+                                        c->state, err);
+    }
+    for (int32_t i = 0; i < f->n_z && status == MHE_OK; i++) {
+        z[i] = c->state[s->z_state[i] * f->n_m + f->z_muscle[i]];
+    }
+    return status;
 }
 
 mhe_status mhi_system_markers(mhi_system_context *c, const double *q, double *marker,
@@ -205,147 +344,21 @@ mhe_status mhi_system_markers(mhi_system_context *c, const double *q, double *ma
     return c->system->model->kinematics(c->model, q, c->zero, &out, err);
 }
 
-static void set_sizes(mhi_system *s, const mhi_system_setup *setup) {
-    const mhe_description *d = setup->description;
-    const int32_t n_q = d->n_coordinates, n_m = d->n_muscles;
-    const int32_t n_a = setup->formulation == MHE_FORMULATION_EXCITATION ? n_m : 0;
-    const int32_t n_r = setup->residual_torques ? n_q : 0;
-    s->face = (mhe_system){.size = sizeof s->face,
-                           .n_q = n_q,
-                           .n_m = n_m,
-                           .n_r = n_r,
-                           .n_a = n_a,
-                           .n_x = 2 * n_q + n_a,
-                           .n_u = n_m + n_r,
-                           .data = s,
-                           .acceleration = acceleration,
-                           .activation_rate = activation_rate};
+const double *mhi_system_activation(const mhi_system *s, const double *x, const double *u) {
+    const mhe_block *block = mhe_layout_find(&s->layout, MHE_ROLE_STATE, "activation");
+    return block != NULL ? x + block->first : u;
 }
 
-/* Far above any body, and low enough for every size of a problem to be an int32_t. */
-#define MOST_COORDINATES 500
-#define MOST_MUSCLES 5000
-#define MOST_MARKERS 5000
-
-static mhe_status check_sizes(const mhe_description *d, mhe_error *err) {
-    if (d->n_coordinates == 0) {
-        return mhe_fail(err, MHE_E_INPUT, "%s: the model has no free coordinate", d->source);
-    }
-    if (d->n_coordinates > MOST_COORDINATES || d->n_muscles > MOST_MUSCLES ||
-        d->n_markers > MOST_MARKERS) {
-        return mhe_fail(err, MHE_E_INPUT,
-                        "%s: %d free coordinates, %d muscles, %d markers; at most %d, %d, %d are "
-                        "possible",
-                        d->source, d->n_coordinates, d->n_muscles, d->n_markers, MOST_COORDINATES,
-                        MOST_MUSCLES, MOST_MARKERS);
-    }
-    return MHE_OK;
-}
-
-mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system, mhe_error *err) {
-    *system = NULL;
-    const mhe_description *d = setup->description;
-    mhe_status sizes = check_sizes(d, err);
-    if (sizes != MHE_OK) {
-        return sizes;
-    }
-    mhi_arena arena = {0};
-    mhi_system *s = MHI_TAKE(&arena, mhi_system, 1);
-    if (s == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    s->arena = arena;
-    s->description = d;
-    s->formulation = setup->formulation;
-    s->model = setup->model->ops;
-    s->muscle = setup->muscle->ops;
-    set_sizes(s, setup);
-    mhe_status status =
-        mhi_model_create(setup->model, setup->host, d, setup->model_config, &s->model_self, err);
-    if (status == MHE_OK) {
-        status = mhi_muscle_create(setup->muscle, setup->host, d->muscles, d->n_muscles,
-                                   setup->muscle_config, &s->muscle_self, err);
-    }
-    if (status != MHE_OK) {
-        mhi_system_free(s);
-        return status;
-    }
-    *system = s;
-    return MHE_OK;
-}
-
-void mhi_system_free(mhi_system *s) {
-    if (s == NULL) {
-        return;
-    }
-    if (s->muscle_self != NULL) {
-        s->muscle->destroy(s->muscle_self);
-    }
-    if (s->model_self != NULL) {
-        s->model->destroy(s->model_self);
-    }
-    mhi_arena arena = s->arena; /* the system lies in its own arena */
-    mhi_arena_free(&arena);
-}
-
-const mhe_description *mhi_system_description(const mhi_system *s) {
-    return s->description;
-}
-
-int32_t mhi_system_formulation(const mhi_system *s) {
-    return s->formulation;
-}
-
-const mhe_system *mhi_system_face(const mhi_system *s) {
-    return &s->face;
-}
-
-mhe_status mhi_system_context_create(const mhi_system *s, mhi_system_context **context,
-                                     mhe_error *err) {
-    *context = NULL;
-    const int32_t n_q = s->face.n_q, n_m = s->face.n_m;
-    mhi_arena arena = {0};
-    mhi_system_context *c = MHI_TAKE(&arena, mhi_system_context, 1);
-    if (c == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    c->system = s;
-    c->n_q = n_q;
-    c->n_m = n_m;
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {
-        {&c->zero, n_q},           {&c->mass, n_q * n_q},     {&c->bias, n_q},
-        {&c->length, n_m},         {&c->length_q, n_m * n_q}, {&c->length_qq, n_m * n_q * n_q},
-        {&c->velocity, n_m},       {&c->force, n_m},          {&c->force_a, n_m},
-        {&c->force_l, n_m},        {&c->force_w, n_m},        {&c->force_q, n_m * n_q},
-        {&c->force_v, n_m * n_q},  {&c->moment, n_q},         {&c->moment_q, n_q * n_q},
-        {&c->moment_v, n_q * n_q}, {&c->tau_q, n_q * n_q},    {&c->tau_v, n_q * n_q}};
-    mhe_status status = MHE_OK;
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0] && status == MHE_OK; i++) {
-        *wanted[i].array = MHI_TAKE(&arena, double, wanted[i].n);
-        status = *wanted[i].array == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
-    }
-    c->arena = arena;
-    if (status == MHE_OK) {
-        status = s->model->context_create(s->model_self, &c->model, err);
-    }
-    if (status != MHE_OK) {
-        mhi_system_context_free(c);
-        return status;
-    }
-    *context = c;
-    return MHE_OK;
-}
-
-void mhi_system_context_free(mhi_system_context *c) {
-    if (c == NULL) {
-        return;
-    }
-    if (c->model != NULL) {
-        c->system->model->context_destroy(c->model);
-    }
-    mhi_arena arena = c->arena;
-    mhi_arena_free(&arena);
+void mhi_system_point(const mhi_system *s, const double *x, const double *u, const double *w,
+                      mhe_system_point *point) {
+    const mhe_system *f = &s->face;
+    const double *d = x + 2 * f->n_q;
+    *point = (mhe_system_point){.size = sizeof *point,
+                                .q = x,
+                                .v = x + f->n_q,
+                                .a = f->n_d > 0 ? d : (f->n_a > 0 ? u : NULL),
+                                .z = f->n_z > 0 ? d + f->n_d : NULL,
+                                .c = u,
+                                .r = f->n_r > 0 && u != NULL ? u + f->n_m : NULL,
+                                .w = w};
 }

@@ -1,20 +1,36 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* system.h: the musculoskeletal system = skeleton (model plugin) + muscles (muscle plugin) +
- * residual torques.
+/* system.h: the musculoskeletal system = skeleton (model plugin) + muscles (muscle plugin) + other
+ * forces (force plugins) + residual torques.
  *
- *     M(q) vdot = r - L_q(q)^T F(a, L(q), Ldot) - bias(q, v),     Ldot = L_q v
+ *     M(q) vdot = r - L_q(q)^T F(s, L(q), Ldot) + tau(q, v, w) - bias(q, v),     Ldot = L_q v
  *
- * States and controls are laid out as mhe/integrator.h says. */
+ * s are the muscles' states, w the inputs of the forces. What the numbers of x, u, w are says the
+ * layout (mhe/layout.h), which is made here and nowhere else. */
 #ifndef MHI_SYSTEM_H
 #define MHI_SYSTEM_H
 
 #include <mhe/cost.h>
+#include <mhe/force.h>
 #include <mhe/integrator.h>
+#include <mhe/layout.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
 
-/* Plugins with their filled configs; formulation is MHE_FORMULATION_*. All lent for the system's
- * life. */
+/* General bounds of a run; those of the coordinates are the description's. */
+typedef struct mhi_bounds {
+    double velocity_max; /* rad/s */
+    double activation_min, activation_max, excitation_min, excitation_max;
+    const double *torque_max; /* [n_q] of the residual torques, N m (N) */
+} mhi_bounds;
+
+/* A force plugin and its filled config. */
+typedef struct mhi_force_setup {
+    const mhe_plugin *plugin;
+    const void *config;
+} mhi_force_setup;
+
+/* Plugins with their filled configs; formulation is MHE_FORMULATION_*. All but `bounds` lent for
+ * the system's life. */
 typedef struct mhi_system_setup {
     const mhe_host *host;
     const mhe_description *description;
@@ -24,6 +40,9 @@ typedef struct mhi_system_setup {
     const void *muscle_config;
     int32_t formulation;
     int32_t residual_torques; /* 0 or 1 */
+    const mhi_force_setup *forces;
+    int32_t n_forces;
+    const mhi_bounds *bounds; /* NULL: none */
 } mhi_system_setup;
 
 typedef struct mhi_system mhi_system;
@@ -36,33 +55,47 @@ int32_t mhi_system_formulation(const mhi_system *system);
 /* What an integrator sees. */
 const mhe_system *mhi_system_face(const mhi_system *system);
 
+/* Where x [n_x], u [n_u], w [n_w] stand in the terms of mhe/integrator.h. u and w may be NULL: what
+ * they hold is then NULL. */
+void mhi_system_point(const mhi_system *system, const double *x, const double *u, const double *w,
+                      mhe_system_point *point);
+/* Activations [n_m] of x and u; activation-driven and u NULL: NULL. */
+const double *mhi_system_activation(const mhi_system *system, const double *x, const double *u);
+
 /* Memory for one thread; it is the `context` that mhe_system.acceleration takes. [cold] */
 typedef struct mhi_system_context mhi_system_context;
 mhe_status mhi_system_context_create(const mhi_system *system, mhi_system_context **context,
                                      mhe_error *err);
 void mhi_system_context_free(mhi_system_context *context);
 
-/* Results of mhi_system_muscles and mhi_system_kinematics, valid until the context's next call.
- * Derivatives are there only where they were asked for. n_k markers, n_m muscles, n_q coordinates;
- * row-major. */
+/* Results of mhi_system_muscles, valid until the context's next call. Derivatives are there only
+ * where they were asked for. n_m muscles, n_q coordinates; row-major. */
 typedef struct mhi_muscle_state {
     const double *length, *length_q; /* [n_m], [n_m x n_q] */
     const double *velocity;          /* [n_m] */
     const double *force;             /* [n_m] */
     const double *force_q, *force_v; /* [n_m x n_q] each */
-    const double *force_a;           /* [n_m] */
+    const double *force_a;           /* [n_m], where n_a > 0 */
+    const double *force_z;           /* [n_z] of its own muscle */
     const double *moment;            /* -L_q^T F [n_q] */
     const double *moment_q;          /* [n_q x n_q] */
     const double *moment_v;          /* [n_q x n_q] */
 } mhi_muscle_state;
 
-/* Muscle forces and their joint moments at (q, v, a). [hot] */
-mhe_status mhi_system_muscles(mhi_system_context *context, const double *q, const double *v,
-                              const double *a, int32_t derivatives, mhi_muscle_state *out,
-                              mhe_error *err);
+/* Muscle forces and their joint moments; of `at` q, v, a and z are read. [hot] */
+mhe_status mhi_system_muscles(mhi_system_context *context, const mhe_system_point *at,
+                              int32_t derivatives, mhi_muscle_state *out, mhe_error *err);
+
+/* Muscle states in equilibrium with activations [n_m] at (q, v): d and z of a state x [n_x], the
+ * rest of which is not touched. [cold] */
+mhe_status mhi_system_equilibrium(mhi_system_context *context, const double *q, const double *v,
+                                  const double *activation, double *x, mhe_error *err);
 
 /* Marker positions [n_k x 3] and, if not NULL, their Jacobian [3 n_k x n_q]. [hot] */
 mhe_status mhi_system_markers(mhi_system_context *context, const double *q, double *marker,
                               double *marker_q, mhe_error *err);
+
+/* General bounds of all entries of a role, one behind the other. */
+void mhi_layout_bounds(const mhe_layout *layout, int32_t role, double *lower, double *upper);
 
 #endif

@@ -143,8 +143,9 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
         status = evaluate_cost(ocp, w, k, x, u, out, err);
     }
     if (status == MHE_OK && u != NULL && out->x_next != NULL) {
-        status = ocp->integrator->step(w->integrator, x, u, ocp->interval, interval_memory(ocp, k),
-                                       out->x_next, out->A, out->B, err);
+        const mhe_step_derivatives d = {sizeof d, out->A, out->B, out->P};
+        status = ocp->integrator->step(w->integrator, x, u, NULL, ocp->interval,
+                                       interval_memory(ocp, k), out->x_next, &d, err);
     }
     return status;
 }
@@ -247,8 +248,8 @@ void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {
 
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
                            mhe_error *err) {
-    return ocp->integrator->step(ocp->workers[0].integrator, x, u, ocp->interval, NULL, x_next,
-                                 NULL, NULL, err);
+    return ocp->integrator->step(ocp->workers[0].integrator, x, u, NULL, ocp->interval, NULL,
+                                 x_next, NULL, err);
 }
 
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp) {

@@ -6,15 +6,20 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Velocities and positions move with everything; an activation with itself and its excitation. */
+/* A diagonal entry moves with itself and its muscle's control; all others, which see positions,
+ * with everything. */
 static void dynamics_pattern(const mhe_system *f, uint8_t *A, uint8_t *B) {
-    for (int32_t i = 0; i < f->n_x; i++) {
-        const int32_t muscle = i - 2 * f->n_q;
-        for (int32_t j = 0; j < f->n_x; j++) {
-            A[i * f->n_x + j] = muscle < 0 || i == j;
-        }
-        for (int32_t j = 0; j < f->n_u; j++) {
-            B[i * f->n_u + j] = muscle < 0 || muscle == j;
+    for (int32_t b = 0; b < f->layout->n_blocks; b++) {
+        const mhe_block *block = mhe_layout_at(f->layout, b);
+        const int diagonal = block->structure == MHE_STRUCTURE_DIAGONAL;
+        for (int32_t k = 0; k < block->count && block->role == MHE_ROLE_STATE; k++) {
+            const int32_t i = block->first + k;
+            for (int32_t j = 0; j < f->n_x; j++) {
+                A[i * f->n_x + j] = !diagonal || i == j;
+            }
+            for (int32_t j = 0; j < f->n_u; j++) {
+                B[i * f->n_u + j] = !diagonal || block->owner[k] == j;
+            }
         }
     }
 }
@@ -125,7 +130,8 @@ static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_erro
                        .n_intervals = setup->n_intervals,
                        .interval = setup->interval,
                        .data = ocp,
-                       .find_signal = mhi_ocp_find_signal};
+                       .find_signal = mhi_ocp_find_signal,
+                       .layout = mhi_system_face(setup->system)->layout};
     mhe_status status =
         name_list(&ocp->arena, p->n_q, &p->coordinate_names, err, coordinate_name, d);
     if (status == MHE_OK) {

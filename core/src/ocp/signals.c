@@ -7,19 +7,25 @@
 void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     const mhe_system *f = mhi_system_face(system);
     const int32_t n_k = mhi_system_description(system)->n_markers;
-    const int32_t n_q = f->n_q, n_m = f->n_m, driven = f->n_a > 0; /* by excitations */
-    const int32_t all = 2 * n_q + n_m; /* [q v a] is contiguous in z either way */
+    const mhe_layout *l = f->layout;
+    const mhe_block *activation = mhe_layout_find(l, MHE_ROLE_STATE, "activation");
+    const mhe_block *residual = mhe_layout_find(l, MHE_ROLE_CONTROL, "residual_torque");
+    const int32_t n_q = f->n_q, n_m = f->n_m, driven = activation != NULL; /* by excitations */
+    const int32_t qdot = mhe_layout_find(l, MHE_ROLE_STATE, "qdot")->first;
+    const int32_t all = driven ? f->n_x : f->n_x + n_m; /* what muscles see is contiguous in z */
+    const int32_t n_r = residual != NULL ? residual->count : 0;
     *signals = (mhi_signals){
         .signal = {
             [MHI_SIGNAL_MARKERS] = {"markers", "m", 3 * n_k, 0, 0, n_q, 0, 0},
             [MHI_SIGNAL_Q] = {"q", "rad", n_q, 0, 0, 0, 0, 0},
-            [MHI_SIGNAL_QDOT] = {"qdot", "rad/s", n_q, 0, n_q, 0, 0, 0},
-            [MHI_SIGNAL_ACTIVATION] = {"activation", "1", n_m, 0, 2 * n_q, 0, !driven, 0},
+            [MHI_SIGNAL_QDOT] = {"qdot", "rad/s", n_q, 0, qdot, 0, 0, 0},
+            [MHI_SIGNAL_ACTIVATION] = {"activation", "1", n_m, 0,
+                                       driven ? activation->first : f->n_x, 0, !driven, 0},
             [MHI_SIGNAL_EXCITATION] = {"excitation", "1", driven ? n_m : 0, 0, f->n_x, 0, 1, 0},
             [MHI_SIGNAL_MUSCLE_FORCE] = {"muscle_force", "N", n_m, 0, 0, all, !driven, 0},
             [MHI_SIGNAL_JOINT_MOMENT] = {"joint_moment", "N m", n_q, 0, 0, all, !driven, 0},
-            [MHI_SIGNAL_RESIDUAL_TORQUE] = {"residual_torque", "N m", f->n_r, 0, f->n_x + n_m, 0, 1,
-                                            0},
+            [MHI_SIGNAL_RESIDUAL_TORQUE] = {"residual_torque", "N m", n_r, 0,
+                                            f->n_x + (n_r > 0 ? residual->first : 0), 0, 1, 0},
         }};
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         mhi_signal *s = &signals->signal[i];
@@ -36,40 +42,56 @@ static void fill_nan(double *y, int32_t n) {
     }
 }
 
-/* dF/d[q v a] = [F_q F_v diag(F_a)] and d moment/d[q v a] = [moment_q moment_v -L_q^T diag(F_a)] */
-static void muscle_blocks(const mhi_muscle_state *s, int32_t n_q, int32_t n_m, double *force,
-                          double *moment) {
-    const int32_t n = 2 * n_q + n_m;
+/* Derivatives of muscle m's force by its states, times `factor`, into their columns of a row; the
+ * activations' are those from `a` on. */
+static void add_states(const mhe_system *f, const mhi_muscle_state *s, int32_t m, double factor,
+                       int32_t a, double *row) {
+    if (f->n_a > 0) {
+        row[a + m] = factor * s->force_a[m];
+    }
+    for (int32_t k = 0; k < f->n_k && f->z_of[m * f->n_k + k] >= 0; k++) {
+        const int32_t i = f->z_of[m * f->n_k + k];
+        row[f->n_x - f->n_z + i] = factor * s->force_z[i];
+    }
+}
+
+/* dF/d[q v ..] = [F_q F_v diag(F_a) ..] and d moment/d[q v ..] = [moment_q moment_v -L_q^T
+ * diag(F_a)
+ * ..]; `width` columns, the activations' from `a` on. */
+static void muscle_blocks(const mhe_system *f, const mhi_muscle_state *s, int32_t width, int32_t a,
+                          double *force, double *moment) {
+    const int32_t n_q = f->n_q, n_m = f->n_m;
     const size_t row = sizeof(double) * (size_t)n_q;
     if (force != NULL) {
-        memset(force, 0, sizeof(double) * (size_t)(n_m * n));
+        memset(force, 0, sizeof(double) * (size_t)(n_m * width));
         for (int32_t m = 0; m < n_m; m++) {
-            memcpy(force + m * n, s->force_q + m * n_q, row);
-            memcpy(force + m * n + n_q, s->force_v + m * n_q, row);
-            force[m * n + 2 * n_q + m] = s->force_a[m];
+            memcpy(force + m * width, s->force_q + m * n_q, row);
+            memcpy(force + m * width + n_q, s->force_v + m * n_q, row);
+            add_states(f, s, m, 1, a, force + m * width);
         }
     }
     if (moment != NULL) {
         for (int32_t i = 0; i < n_q; i++) {
-            memcpy(moment + i * n, s->moment_q + i * n_q, row);
-            memcpy(moment + i * n + n_q, s->moment_v + i * n_q, row);
+            memcpy(moment + i * width, s->moment_q + i * n_q, row);
+            memcpy(moment + i * width + n_q, s->moment_v + i * n_q, row);
             for (int32_t m = 0; m < n_m; m++) {
-                moment[i * n + 2 * n_q + m] = -s->length_q[m * n_q + i] * s->force_a[m];
+                add_states(f, s, m, -s->length_q[m * n_q + i], a, moment + i * width);
             }
         }
     }
 }
 
-static mhe_status muscle_signals(const mhi_signals *signals, const mhe_system *f,
+static mhe_status muscle_signals(const mhi_signals *signals, const mhi_system *system,
                                  mhi_system_context *context, uint32_t wanted, const double *x,
-                                 const double *a, double *y, double *jacobian, mhe_error *err) {
+                                 const double *u, double *y, double *jacobian, mhe_error *err) {
     const mhi_signal *force = &signals->signal[MHI_SIGNAL_MUSCLE_FORCE];
     const mhi_signal *moment = &signals->signal[MHI_SIGNAL_JOINT_MOMENT];
     const int want_force = (wanted >> MHI_SIGNAL_MUSCLE_FORCE & 1) != 0;
     const int want_moment = (wanted >> MHI_SIGNAL_JOINT_MOMENT & 1) != 0;
     mhi_muscle_state state;
-    mhe_status status =
-        mhi_system_muscles(context, x, x + f->n_q, a, jacobian != NULL, &state, err);
+    mhe_system_point at;
+    mhi_system_point(system, x, u, NULL, &at);
+    mhe_status status = mhi_system_muscles(context, &at, jacobian != NULL, &state, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -80,7 +102,9 @@ static mhe_status muscle_signals(const mhi_signals *signals, const mhe_system *f
         memcpy(y + moment->offset, state.moment, sizeof(double) * (size_t)moment->n_y);
     }
     if (jacobian != NULL) {
-        muscle_blocks(&state, f->n_q, f->n_m, want_force ? jacobian + force->jacobian : NULL,
+        muscle_blocks(mhi_system_face(system), &state, force->n_columns,
+                      signals->signal[MHI_SIGNAL_ACTIVATION].column,
+                      want_force ? jacobian + force->jacobian : NULL,
                       want_moment ? jacobian + moment->jacobian : NULL);
     }
     return MHE_OK;
@@ -109,9 +133,9 @@ mhe_status mhi_signals_evaluate(const mhi_signals *signals, const mhi_system *sy
                                     jacobian == NULL ? NULL : jacobian + s->jacobian, err);
     }
     const uint32_t of_muscles = 1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT;
-    const double *a = f->n_a > 0 ? x + 2 * f->n_q : u;
-    if (status == MHE_OK && (wanted & of_muscles) != 0 && a != NULL) {
-        status = muscle_signals(signals, f, context, wanted, x, a, y, jacobian, err);
+    const int known = u != NULL || !signals->signal[MHI_SIGNAL_MUSCLE_FORCE].reads_u;
+    if (status == MHE_OK && (wanted & of_muscles) != 0 && known) {
+        status = muscle_signals(signals, system, context, wanted, x, u, y, jacobian, err);
     }
     return status;
 }

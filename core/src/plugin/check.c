@@ -4,6 +4,7 @@
 #include "config/options.h"
 
 #include <mhe/cost.h>
+#include <mhe/force.h>
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
@@ -38,9 +39,14 @@ static const interface interfaces[] = {
      {FN(mhe_cost_ops, create), FN(mhe_cost_ops, destroy)}},
     {MHE_MUSCLE_IFACE,
      sizeof(mhe_muscle_ops),
-     {FN(mhe_muscle_ops, create), FN(mhe_muscle_ops, destroy), FN(mhe_muscle_ops, force),
-      FN(mhe_muscle_ops, activation_rate)},
+     {FN(mhe_muscle_ops, create), FN(mhe_muscle_ops, destroy), FN(mhe_muscle_ops, layout),
+      FN(mhe_muscle_ops, evaluate)},
      {{NULL, 0}, {NULL, 0}}},
+    {MHE_FORCE_IFACE,
+     sizeof(mhe_force_ops),
+     {FN(mhe_force_ops, create), FN(mhe_force_ops, destroy), FN(mhe_force_ops, layout),
+      FN(mhe_force_ops, evaluate)},
+     {FN(mhe_force_ops, input), FN(mhe_force_ops, covers)}},
     {MHE_MODEL_IFACE,
      sizeof(mhe_model_ops),
      {FN(mhe_model_ops, create), FN(mhe_model_ops, destroy), FN(mhe_model_ops, context_create),

@@ -11,7 +11,7 @@ typedef struct call {
     int32_t n_muscles;
     const void *config;
     void **self;
-    mhe_cost_layout *layout;
+    void *layout; /* of the interface */
     mhe_error *err;
 } call;
 
@@ -35,19 +35,33 @@ static mhe_status create_model(void *data) {
 static mhe_status create_muscle(void *data) {
     const call *c = data;
     const mhe_muscle_ops *ops = c->ops;
-    return ops->create(c->host, c->subject, c->n_muscles, c->config, c->self, c->err);
+    mhe_status status = ops->create(c->host, c->subject, c->n_muscles, c->config, c->self, c->err);
+    return status == MHE_OK ? ops->layout(*c->self, c->layout, c->err) : status;
+}
+
+static mhe_status create_force(void *data) {
+    const call *c = data;
+    const mhe_force_ops *ops = c->ops;
+    mhe_status status = ops->create(c->host, c->subject, c->config, c->self, c->err);
+    return status == MHE_OK ? ops->layout(*c->self, c->layout, c->err) : status;
 }
 
 static mhe_status create_integrator(void *data) {
     const call *c = data;
     const mhe_integrator_ops *ops = c->ops;
-    return ops->create(c->host, c->subject, c->config, c->self, c->err);
+    mhe_status status = ops->accepts != NULL ? ops->accepts(c->subject, c->config, c->err) : MHE_OK;
+    return status != MHE_OK ? status : ops->create(c->host, c->subject, c->config, c->self, c->err);
 }
 
 static mhe_status create_solver(void *data) {
     const call *c = data;
     const mhe_solver_ops *ops = c->ops;
-    return ops->create(c->host, c->subject, c->config, c->self, c->err);
+    const mhe_stage_problem *problem = c->subject;
+    if (ops->accepts == NULL && problem->n_p > 0) {
+        return mhe_fail(c->err, MHE_E_UNSUPPORTED, "it solves problems without parameters only");
+    }
+    mhe_status status = ops->accepts != NULL ? ops->accepts(c->subject, c->config, c->err) : MHE_OK;
+    return status != MHE_OK ? status : ops->create(c->host, c->subject, c->config, c->self, c->err);
 }
 
 static mhe_status create_cost(void *data) {
@@ -73,14 +87,29 @@ mhe_status mhi_model_create(const mhe_plugin *plugin, const mhe_host *host,
 
 mhe_status mhi_muscle_create(const mhe_plugin *plugin, const mhe_host *host,
                              const mhe_muscle *muscles, int32_t n_muscles, const void *config,
-                             void **self, mhe_error *err) {
+                             void **self, mhe_muscle_layout *layout, mhe_error *err) {
     call c = {.host = host,
               .subject = muscles,
               .n_muscles = n_muscles,
               .config = config,
               .self = self,
+              .layout = layout,
               .err = err};
+    *layout = (mhe_muscle_layout){.size = sizeof *layout};
     return guarded(create_muscle, plugin, &c);
+}
+
+mhe_status mhi_force_create(const mhe_plugin *plugin, const mhe_host *host,
+                            const mhe_description *description, const void *config, void **self,
+                            mhe_force_layout *layout, mhe_error *err) {
+    call c = {.host = host,
+              .subject = description,
+              .config = config,
+              .self = self,
+              .layout = layout,
+              .err = err};
+    *layout = (mhe_force_layout){.size = sizeof *layout};
+    return guarded(create_force, plugin, &c);
 }
 
 mhe_status mhi_integrator_create(const mhe_plugin *plugin, const mhe_host *host,

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* instance.h: creates instances of plugins; an exception that a plugin throws becomes MHE_E_PLUGIN.
- * Messages of a failure begin with "<plugin id>: ". */
+ * Messages of a failure begin with "<plugin id>: ". Where an interface asks whether a plugin
+ * accepts its task, that is asked first. */
 #ifndef MHI_INSTANCE_H
 #define MHI_INSTANCE_H
 
 #include <mhe/cost.h>
+#include <mhe/force.h>
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
@@ -16,7 +18,11 @@ mhe_status mhi_model_create(const mhe_plugin *plugin, const mhe_host *host,
                             mhe_error *err);
 mhe_status mhi_muscle_create(const mhe_plugin *plugin, const mhe_host *host,
                              const mhe_muscle *muscles, int32_t n_muscles, const void *config,
-                             void **self, mhe_error *err);
+                             void **self, mhe_muscle_layout *layout, mhe_error *err);
+/* create(), then layout(); both here and of muscles. */
+mhe_status mhi_force_create(const mhe_plugin *plugin, const mhe_host *host,
+                            const mhe_description *description, const void *config, void **self,
+                            mhe_force_layout *layout, mhe_error *err);
 mhe_status mhi_integrator_create(const mhe_plugin *plugin, const mhe_host *host,
                                  const mhe_system *system, const void *config, void **self,
                                  mhe_error *err);

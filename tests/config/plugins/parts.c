@@ -56,23 +56,22 @@ static mhe_status muscle_create(const mhe_host *host, const mhe_muscle *muscles,
     return refuse(err);
 }
 
-static mhe_status force(const void *self, const double *a, const double *l, const double *w,
-                        const mhe_muscle_force *out, mhe_error *err) {
-    (void)self, (void)a, (void)l, (void)w, (void)out;
+static mhe_status muscle_layout(const void *self, mhe_muscle_layout *out, mhe_error *err) {
+    (void)self, (void)out;
     return refuse(err);
 }
 
-static mhe_status activation_rate(const void *self, const double *e, const double *a, double *rate,
-                                  double *rate_e, double *rate_a, mhe_error *err) {
-    (void)self, (void)e, (void)a, (void)rate, (void)rate_e, (void)rate_a;
+static mhe_status evaluate(const void *self, const mhe_muscle_point *at,
+                           const mhe_muscle_values *out, mhe_error *err) {
+    (void)self, (void)at, (void)out;
     return refuse(err);
 }
 
 static const mhe_muscle_ops muscle_ops = {.size = sizeof muscle_ops,
                                           .create = muscle_create,
                                           .destroy = destroy,
-                                          .force = force,
-                                          .activation_rate = activation_rate};
+                                          .layout = muscle_layout,
+                                          .evaluate = evaluate};
 
 static mhe_status integrator_create(const mhe_host *host, const mhe_system *system,
                                     const void *config, void **self, mhe_error *err) {
@@ -86,9 +85,10 @@ static mhe_status integrator_context(const void *self, void *system_context, voi
     return refuse(err);
 }
 
-static mhe_status step(void *context, const double *x, const double *u, double dt, double *memory,
-                       double *x_next, double *A, double *B, mhe_error *err) {
-    (void)context, (void)x, (void)u, (void)dt, (void)memory, (void)x_next, (void)A, (void)B;
+static mhe_status step(void *context, const double *x, const double *u, const double *w, double dt,
+                       double *memory, double *x_next, const mhe_step_derivatives *out,
+                       mhe_error *err) {
+    (void)context, (void)x, (void)u, (void)w, (void)dt, (void)memory, (void)x_next, (void)out;
     return refuse(err);
 }
 

@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* forces.c: the force plugins of a system. */
+#include "model/system_private.h"
+#include "plugin/instance.h"
+
+#include <math.h>
+#include <string.h>
+
+static int32_t larger(int32_t a, int32_t b) {
+    return a > b ? a : b;
+}
+
+static mhe_status bad(const mhi_force *f, mhe_error *err, const char *what, int32_t value,
+                      int32_t limit) {
+    return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gives %s %d of 0 .. %d", f->plugin->id, what,
+                    value, limit);
+}
+
+static mhe_status check_layout(const mhi_force *f, const mhi_system *s, mhe_error *err) {
+    const mhe_force_layout *l = &f->layout;
+    if (l->n_inputs < 0 || l->n_paths < 0 || l->n_loads < 0 || l->n_parameters < 0 ||
+        (l->n_inputs > 0 && (l->input_names == NULL || l->input_units == NULL)) ||
+        (l->n_paths > 0 && l->paths == NULL) || (l->n_loads > 0 && l->loads == NULL) ||
+        (l->n_parameters > 0 && l->parameter_names == NULL)) {
+        return mhe_fail(err, MHE_E_PLUGIN,
+                        "%s: layout() gives a count below 0, or one without its list",
+                        f->plugin->id);
+    }
+    for (int32_t i = 0; i < l->n_paths; i++) {
+        if (l->paths[i] < 0 || l->paths[i] >= s->n_paths) {
+            return bad(f, err, "path", l->paths[i], s->n_paths - 1);
+        }
+    }
+    for (int32_t i = 0; i < l->n_loads; i++) {
+        const int32_t of[] = {l->loads[i].body, l->loads[i].axes, l->loads[i].origin};
+        for (int32_t k = 0; k < 3; k++) {
+            if (of[k] < (k == 0 ? 0 : -1) || of[k] >= s->description->n_bodies) {
+                return bad(f, err, "body", of[k], s->description->n_bodies - 1);
+            }
+        }
+    }
+    return l->n_loads > 0 && s->model->loads == NULL
+               ? mhe_fail(err, MHE_E_UNSUPPORTED, "%s: the model cannot load bodies", f->plugin->id)
+               : MHE_OK;
+}
+
+mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err) {
+    s->forces = MHI_TAKE(&s->arena, mhi_force, setup->n_forces);
+    if (s->forces == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    s->n_forces = setup->n_forces;
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < setup->n_forces && status == MHE_OK; i++) {
+        mhi_force *f = &s->forces[i];
+        f->plugin = setup->forces[i].plugin;
+        f->ops = f->plugin->ops;
+        status = mhi_force_create(f->plugin, setup->host, s->description, setup->forces[i].config,
+                                  &f->self, &f->layout, err);
+        s->n_forces_created = i + 1;
+        if (status == MHE_OK) {
+            status = check_layout(f, s, err);
+        }
+        f->name = f->layout.name != NULL ? f->layout.name : f->plugin->id;
+        f->first_input = s->face.n_w;
+        s->face.n_w += f->layout.n_inputs;
+        s->most_inputs = larger(s->most_inputs, f->layout.n_inputs);
+        s->most_paths = larger(s->most_paths, f->layout.n_paths);
+        s->most_loads = larger(s->most_loads, f->layout.n_loads);
+    }
+    return status;
+}
+
+void mhi_forces_destroy(mhi_system *s) {
+    for (int32_t i = 0; i < s->n_forces_created; i++) {
+        if (s->forces[i].self != NULL) {
+            s->forces[i].ops->destroy(s->forces[i].self);
+        }
+    }
+}
+
+static void zero(double *values, int32_t n) {
+    memset(values, 0, sizeof(double) * (size_t)n);
+}
+
+static int all_finite(const double *values, int32_t n) {
+    double sum = 0;
+    for (int32_t i = 0; i < n; i++) {
+        sum += values[i] * 0.0;
+    }
+    return sum == 0;
+}
+
+static void add(double *to, const double *from, int32_t n) {
+    for (int32_t i = 0; i < n; i++) {
+        to[i] += from[i];
+    }
+}
+
+/* Calls one plugin, whose values then stand in the context. */
+static mhe_status evaluate_one(mhi_system_context *c, const mhi_force *f,
+                               const mhe_system_point *at, int32_t derivatives, mhe_error *err) {
+    const mhe_force_layout *l = &f->layout;
+    const int32_t n_q = c->system->face.n_q;
+    for (int32_t i = 0; i < l->n_paths; i++) {
+        c->t_length[i] = c->length[l->paths[i]];
+        c->t_velocity[i] = c->velocity[l->paths[i]];
+    }
+    const mhe_force_point point = {.size = sizeof point,
+                                   .q = at->q,
+                                   .v = at->v,
+                                   .length = c->t_length,
+                                   .velocity = c->t_velocity,
+                                   .input = l->n_inputs > 0 ? at->w + f->first_input : NULL};
+    mhe_force_values out = {.size = sizeof out};
+    if (l->generalised) {
+        out.tau = c->own;
+        out.tau_q = derivatives ? c->own_q : NULL;
+        out.tau_v = derivatives ? c->own_v : NULL;
+        zero(c->own, n_q);
+        zero(c->own_q, derivatives ? n_q * n_q : 0);
+        zero(c->own_v, derivatives ? n_q * n_q : 0);
+    }
+    if (l->n_paths > 0) {
+        out.tension = c->tension;
+        out.tension_l = derivatives ? c->tension_l : NULL;
+        out.tension_w = derivatives ? c->tension_w : NULL;
+        zero(c->tension, l->n_paths);
+        zero(c->tension_l, l->n_paths);
+        zero(c->tension_w, l->n_paths);
+    }
+    if (l->n_loads > 0) {
+        out.load = c->load;
+        zero(c->load, 9 * l->n_loads);
+    }
+    if (l->n_inputs > 0 && at->w == NULL) {
+        return mhe_fail(err, MHE_E_INPUT, "%s: no inputs are known here", f->name);
+    }
+    mhe_status status = f->ops->evaluate(f->self, &point, &out, err);
+    const int finite = (!l->generalised || all_finite(c->own, n_q)) &&
+                       all_finite(c->tension, l->n_paths) && all_finite(c->load, 9 * l->n_loads);
+    return status == MHE_OK && !finite
+               ? mhe_fail(err, MHE_RETRY, "%s: a force is not finite", f->name)
+               : status;
+}
+
+/* Adds what it does to the whole. */
+static mhe_status add_one(mhi_system_context *c, const mhi_force *f, int32_t derivatives,
+                          mhe_error *err) {
+    const mhe_force_layout *l = &f->layout;
+    const int32_t n_q = c->system->face.n_q;
+    if (l->generalised) {
+        add(c->other, c->own, n_q);
+        add(c->other_q, c->own_q, derivatives ? n_q * n_q : 0);
+        add(c->other_v, c->own_v, derivatives ? n_q * n_q : 0);
+    }
+    for (int32_t i = 0; i < l->n_paths; i++) {
+        mhi_path_moment(c, l->paths[i], c->tension[i], c->other);
+        if (derivatives) {
+            mhi_path_moment_derivatives(c, l->paths[i], c->tension[i], c->tension_l[i],
+                                        c->tension_w[i], c->row_q, c->row_v, c->other_q,
+                                        c->other_v);
+        }
+    }
+    return l->n_loads == 0
+               ? MHE_OK
+               : c->system->model->loads(c->model, l->loads, l->n_loads, c->load, c->other,
+                                         derivatives ? c->other_q : NULL, NULL, err);
+}
+
+mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at,
+                               int32_t derivatives, mhe_error *err) {
+    const mhi_system *s = c->system;
+    const int32_t n_q = s->face.n_q;
+    mhe_status status = MHE_OK;
+    zero(c->other, n_q);
+    zero(c->other_q, derivatives ? n_q * n_q : 0);
+    zero(c->other_v, derivatives ? n_q * n_q : 0);
+    for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
+        status = evaluate_one(c, &s->forces[i], at, derivatives, err);
+        if (status == MHE_OK) {
+            status = add_one(c, &s->forces[i], derivatives, err);
+        }
+    }
+    return status;
+}

@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* system_private.h: the system's parts, shared by its making (system_build.c, layout.c), its
+ * evaluation (system.c) and its forces (forces.c). */
+#ifndef MHI_SYSTEM_PRIVATE_H
+#define MHI_SYSTEM_PRIVATE_H
+
+#include "base/arena.h"
+#include "model/system.h"
+
+/* One force plugin at work. */
+typedef struct mhi_force {
+    const mhe_plugin *plugin;
+    const mhe_force_ops *ops;
+    void *self;
+    mhe_force_layout layout;
+    const char *name;
+    int32_t first_input; /* in w */
+} mhi_force;
+
+struct mhi_system {
+    mhe_system face;
+    mhe_layout layout;
+    const mhe_description *description;
+    int32_t formulation;
+    const mhe_model_ops *model;
+    const mhe_muscle_ops *muscle;
+    void *model_self, *muscle_self;
+    mhe_muscle_layout muscle_layout;
+    int32_t n_s, activation; /* states of a muscle, which of them is the activation */
+    int32_t n_paths;
+    int32_t *first, *end; /* [n_paths] coordinates that a path sees lie in [first, end) */
+    int32_t *z_state;     /* [n_z] which of its muscle's states an entry of z is */
+    mhi_force *forces;
+    int32_t n_forces, n_forces_created;
+    int32_t most_inputs, most_paths, most_loads; /* of one force */
+    mhi_arena arena;
+};
+
+struct mhi_system_context {
+    const mhi_system *system;
+    void *model;
+    double *zero;                                     /* [n_q] */
+    double *mass, *bias;                              /* [n_q x n_q], [n_q] */
+    double *length, *length_q, *length_qq;            /* [n_p], [n_p x n_q], [n_p x n_q x n_q] */
+    double *velocity, *velocity_q;                    /* [n_p], [n_p x n_q] */
+    double *state;                                    /* [n_s x n_m] */
+    double *force, *force_l, *force_w;                /* [n_m] */
+    double *force_s, *force_z;                        /* [n_s x n_m], [n_z] */
+    double *rate, *rate_e, *rate_l, *rate_w, *rate_s; /* [n_s x n_m], the last [n_s x n_s x n_m] */
+    double *force_q, *force_v;                        /* [n_m x n_q] */
+    double *moment, *moment_q, *moment_v;             /* of the muscles: [n_q], [n_q x n_q] */
+    double *tau_q, *tau_v;                            /* of the inverse dynamics [n_q x n_q] */
+    double *other, *other_q, *other_v;                /* of the force plugins [n_q], [n_q x n_q] */
+    double *own, *own_q, *own_v;                      /* of one of them */
+    double *tension, *tension_l, *tension_w, *t_length, *t_velocity; /* [most_paths] */
+    double *load;                                                    /* [most_loads x 9] */
+    double *row_q, *row_v;                                           /* [n_q] */
+    mhi_arena arena;
+};
+
+/* layout.c: fills s->layout and the sizes of s->face from the plugins' layouts. */
+mhe_status mhi_layout_make(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+
+/* system.c: the functions of the face. */
+mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
+                                   const mhe_system_point *at, const mhe_acceleration *out,
+                                   mhe_error *err);
+mhe_status mhi_system_activation_rate(const mhe_system *face, const double *c, const double *d,
+                                      double *rate, double *rate_c, double *rate_d, mhe_error *err);
+
+/* A pull along a path: adds -L_q^T F to `moment`, with `derivatives` what its dF/dL and dF/dLdot
+ * make of moment_q and moment_v; force_q, force_v [n_q] are its own derivatives. */
+void mhi_path_moment(const mhi_system_context *c, int32_t path, double force, double *moment);
+void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, double force,
+                                 double force_l, double force_w, double *force_q, double *force_v,
+                                 double *moment_q, double *moment_v);
+
+/* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
+ * in other_q, other_v. Needs the kinematics of `at` in the context. */
+mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+void mhi_forces_destroy(mhi_system *s);
+mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at,
+                               int32_t derivatives, mhe_error *err);
+
+#endif

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* loads.c: generalised force of forces and torques on bodies.
+ *
+ * A load is, in ground axes at the ground origin, the spatial force F = [x x f + t, f]. With S_i
+ * the axis of joint i, every joint that carries the body takes S_i . F, times its function's slope.
+ * Turning joint j moves S_i by S_j x S_i where j carries joint i, f and t by w_j x where it carries
+ * the body in whose axes they are given, and the point by w_j x + v_j where it carries the body in
+ * whose frame that is. */
+#include "context.h"
+#include "vector.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A load in ground. */
+typedef struct ground_load {
+    int32_t link, axes, origin; /* links; -1: ground */
+    double axes_r[9], origin_r[9];
+    double f[3], x[3], t[3];
+} ground_load;
+
+static int32_t link_of(const tree *t, int32_t body) {
+    return body < 0 ? -1 : t->bodies[body].link;
+}
+
+static ground_load to_ground(const simbody_context *c, const mhe_load *load, const double *value) {
+    ground_load out = {.link = link_of(c->tree, load->body),
+                       .axes = link_of(c->tree, load->axes),
+                       .origin = link_of(c->tree, load->origin)};
+    double p[3];
+    bodies_pose(c, load->axes, out.axes_r, p);
+    rotate3(out.axes_r, value, out.f);
+    rotate3(out.axes_r, value + 6, out.t);
+    bodies_pose(c, load->origin, out.origin_r, p);
+    place3(out.origin_r, p, value + 3, out.x);
+    return out;
+}
+
+/* spatial force of force f at x and torque t; t may be NULL */
+static void spatial(const double *f, const double *x, const double *t, double *out) {
+    cross3(x, f, out);
+    for (int k = 0; k < 3; k++) {
+        out[k] += t == NULL ? 0 : t[k];
+        out[3 + k] = f[k];
+    }
+}
+
+/* Whether turning joint j moves link i. */
+static int carries(const tree *t, int32_t j, int32_t i) {
+    while (i > j) { /* parents have smaller numbers */
+        i = t->joints[i].parent;
+    }
+    return i == j;
+}
+
+/* Change of the load's spatial force when joint j turns. */
+static void force_change(const simbody_context *c, const ground_load *load, int32_t j,
+                         double *out) {
+    const double *axis = c->links[j].axis;
+    double change[3], moment[3];
+    memset(out, 0, 6 * sizeof *out);
+    if (carries(c->tree, j, load->axes)) {
+        cross3(axis, load->f, change);
+        cross3(axis, load->t, moment);
+        spatial(change, load->x, moment, out);
+    }
+    if (carries(c->tree, j, load->origin)) {
+        cross3(axis, load->x, change);
+        add3(change, 1, axis + 3);
+        cross3(change, load->f, moment);
+        add3(out, 1, moment);
+    }
+}
+
+static void add_force(const simbody_context *c, int32_t link, const double *force, int32_t stride,
+                      double *tau) {
+    const tree *t = c->tree;
+    for (int32_t i = link; i >= 0; i = t->joints[i].parent) {
+        tau[t->joints[i].coordinate * stride] +=
+            c->slopes[4 * i + 1] * dot6(c->links[i].axis, force);
+    }
+}
+
+/* d tau/dq of one load. Joints that move it: those that carry its body, its axes or its origin. */
+static void add_derivative(const simbody_context *c, const ground_load *load, const double *force,
+                           double *tau_q) {
+    const tree *t = c->tree;
+    for (int32_t j = 0; j < t->n_joints; j++) {
+        const int32_t below = carries(t, j, load->link), column = t->joints[j].coordinate;
+        if (!below && !carries(t, j, load->axes) && !carries(t, j, load->origin)) {
+            continue;
+        }
+        double change[6];
+        force_change(c, load, j, change);
+        for (int32_t i = load->link; i >= 0; i = t->joints[i].parent) {
+            double by = dot6(c->links[i].axis, change), turned[6];
+            if (i > j && carries(t, j, i)) {
+                cross_motion(c->links[j].axis, c->links[i].axis, turned);
+                by += dot6(turned, force);
+            }
+            tau_q[t->joints[i].coordinate * t->n_q + column] +=
+                c->slopes[4 * i + 1] * by * c->slopes[4 * j + 1];
+        }
+        if (below) { /* the function's own slope */
+            tau_q[column * t->n_q + column] += c->slopes[4 * j + 2] * dot6(c->links[j].axis, force);
+        }
+    }
+}
+
+/* Columns 0 .. 8 of tau_l, `width` wide: by force, point and torque in their frames. */
+static void set_value_derivative(const simbody_context *c, const ground_load *load, int32_t width,
+                                 double *tau_l) {
+    for (int32_t k = 0; k < 9; k++) {
+        const double *r = k / 3 == 1 ? load->origin_r : load->axes_r;
+        const double unit[3] = {r[k % 3], r[3 + k % 3], r[6 + k % 3]};
+        double force[6] = {0};
+        if (k / 3 == 0) {
+            spatial(unit, load->x, NULL, force);
+        } else if (k / 3 == 1) {
+            cross3(unit, load->f, force);
+        } else {
+            memcpy(force, unit, sizeof unit);
+        }
+        for (int32_t i = 0; i < c->tree->n_q; i++) {
+            tau_l[i * width + k] = 0;
+        }
+        add_force(c, load->link, force, width, tau_l + k);
+    }
+}
+
+mhe_status simbody_loads(void *context, const mhe_load *loads, int32_t n, const double *value,
+                         double *tau, double *tau_q, double *tau_l, mhe_error *err) {
+    const simbody_context *c = context;
+    if (!c->placed) {
+        return mhe_fail(err, MHE_RETRY, "no state is set");
+    }
+    for (int32_t i = 0; i < n; i++) {
+        const ground_load load = to_ground(c, &loads[i], value + 9 * i);
+        double force[6], sum = 0;
+        spatial(load.f, load.x, load.t, force);
+        for (int k = 0; k < 6; k++) {
+            sum += force[k] * 0.0;
+        }
+        if (sum != 0) {
+            return mhe_fail(err, MHE_RETRY, "a load is not finite");
+        }
+        if (tau != NULL) {
+            add_force(c, load.link, force, 1, tau);
+        }
+        if (tau_q != NULL) {
+            add_derivative(c, &load, force, tau_q);
+        }
+        if (tau_l != NULL) {
+            set_value_derivative(c, &load, 9 * n, tau_l + 9 * i);
+        }
+    }
+    return MHE_OK;
+}
