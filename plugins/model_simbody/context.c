@@ -46,10 +46,14 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
     if (model == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
     }
+    model->description = description;
     model->dynamics = c->dynamics;
     mhe_status status = tree_create(description, &model->tree, err);
     if (status == MHE_OK) {
         status = check_placement(model->tree, err);
+    }
+    if (status == MHE_OK) {
+        status = routes_create(description, model->tree, &model->routes, err);
     }
     if (status == MHE_OK) {
         model->bundles = path_bundles(model->tree, &model->n_bundles);
@@ -69,6 +73,7 @@ void simbody_destroy(void *self) {
     simbody_model *model = self;
     if (model != NULL) {
         free(model->bundles);
+        routes_free(model->routes);
         tree_free(model->tree);
         free(model);
     }
@@ -82,6 +87,7 @@ static mhe_status context_allocate(simbody_context *c) {
         double **field;
         size_t n;
     } parts[] = {{&c->v, n_q},
+                 {&c->numbers, 4 * (n_q + (size_t)c->description->n_dependents)},
                  {&c->slopes, 4 * n},
                  {&c->angle, n},
                  {&c->speed, n},
@@ -129,11 +135,16 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
     if (c == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for a context");
     }
+    c->description = model->description;
     c->tree = model->tree;
+    c->routes = model->routes;
     c->bundles = model->bundles;
     c->n_bundles = model->n_bundles;
     c->dynamics = model->dynamics;
     mhe_status status = context_allocate(c);
+    if (status == MHE_OK) {
+        status = route_work_create(c->routes, &c->route_work);
+    }
     if (status != MHE_OK) {
         (void)mhe_fail(err, status, "no memory for a context");
         goto fail;
@@ -156,6 +167,7 @@ void simbody_context_destroy(void *context) {
     simbody_context *c = context;
     if (c != NULL) {
         skeleton_free(c->skeleton);
+        route_work_free(&c->route_work);
         free(c->links);
         free(c->steps);
         free(c->points);

@@ -7,17 +7,23 @@
 #include "model.h"
 #include "path.h"
 #include "rounding.h"
+#include "route.h"
 #include "skeleton.h"
 
 typedef struct simbody_model {
+    const mhe_description *description;
     tree *tree;
+    route_set *routes;
     path_bundle *bundles;
     int32_t n_bundles;
     int32_t dynamics; /* SIMBODY_DYNAMICS_* */
 } simbody_model;
 
 typedef struct simbody_context {
+    const mhe_description *description;
     const tree *tree;
+    const route_set *routes;
+    route_work route_work;
     const path_bundle *bundles; /* [n_bundles] the model's */
     int32_t n_bundles;
     int32_t dynamics;
@@ -32,6 +38,7 @@ typedef struct simbody_context {
     link_rounding *rounding; /* likewise */
     double *memory;          /* all below */
     double *v;               /* [n_q] */
+    double *numbers;         /* [4 x coordinates, free and dependent], see numbers.h */
     double *slopes;          /* [n_joints x 4] */
     double *angle, *speed, *acceleration, *torque; /* [n_joints] */
     double *rounding_torque;                       /* [n_joints] */

@@ -5,6 +5,7 @@
  *     theta' = f' v,  theta'' = f' vdot + f'' v^2,  M_q = J^T M J,  tau = J^T T,
  * and the derivatives of tau follow by the chain rule with f'', f'''. */
 #include "context.h"
+#include "numbers.h"
 
 #include <math.h>
 #include <string.h>
@@ -30,10 +31,11 @@ static mhe_status context_place(simbody_context *c, const double *q, const doubl
     const tree *t = c->tree;
     c->placed = c->has_mass = c->has_motion = c->has_rates = 0;
     memcpy(c->v, v, sizeof *v * (size_t)t->n_q);
+    numbers_evaluate(c->description, q, c->numbers);
     for (int32_t i = 0; i < t->n_joints; i++) {
         const tree_joint *joint = &t->joints[i];
         double *f = c->slopes + 4 * i;
-        function_evaluate(joint->function, q[joint->coordinate], f);
+        function_compose(joint->function, c->numbers + 4 * joint->number, f);
         c->angle[i] = f[0];
         c->speed[i] = f[1] * v[joint->coordinate];
     }
@@ -164,6 +166,8 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
         int scratch = out->length_qq != NULL && out->length_q == NULL;
         path_lengths(t, c->bundles, c->n_bundles, &pose, c->steps, out->length,
                      scratch ? c->length_q : out->length_q, out->length_qq);
+        routes_lengths(t, c->routes, &pose, c->numbers, &c->route_work, out->length, out->length_q,
+                       out->length_qq);
     }
     if (out->marker != NULL || out->marker_q != NULL) {
         path_markers(t, &pose, out->marker, out->marker_q);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* The reduction of descriptions: what merges, what remains, what is refused. */
+#include "numbers.h"
 #include "support.h"
 #include "tree.h"
 
@@ -170,10 +171,10 @@ static void wrong_descriptions_are_refused(void **state) {
     assert_refused(&c, "marker 'on b'");
     make_chain(&c);
     c.paths[0].n_points = 1;
-    assert_refused(&c, "muscle 'm'");
+    assert_refused(&c, "path 'm'");
     make_chain(&c);
     c.points[2].location[1] = INFINITY;
-    assert_refused(&c, "muscle 'm'");
+    assert_refused(&c, "path 'm'");
     make_chain(&c);
     c.bodies[2].mass = 0;
     assert_refused(&c, "coordinate 'second' moves no mass");

@@ -2,6 +2,8 @@
 /* tree.c: reduces a description to links and joints of one freedom. */
 #include "tree.h"
 
+#include "numbers.h"
+#include "route.h"
 #include "vector.h"
 
 #include <math.h>
@@ -14,31 +16,6 @@
 typedef tree_place placement;
 
 static const placement ground = {.link = -1, .r = {1, 0, 0, 0, 1, 0, 0, 0, 1}};
-
-void function_evaluate(const mhe_function *function, double t, double *out) {
-    int32_t piece = 0;
-    for (int32_t above = function->n_pieces; above - piece > 1;) {
-        int32_t middle = (piece + above) / 2;
-        if (t >= function->origin[middle]) {
-            piece = middle;
-        } else {
-            above = middle;
-        }
-    }
-    const double *c = function->coef + piece * function->n_coef;
-    double s = t - function->origin[piece];
-    double value = 0, slope = 0, half = 0, sixth = 0; /* f, f', f'' / 2, f''' / 6 by Horner */
-    for (int32_t k = function->n_coef - 1; k >= 0; k--) {
-        sixth = sixth * s + half;
-        half = half * s + slope;
-        slope = slope * s + value;
-        value = value * s + c[k];
-    }
-    out[0] = value;
-    out[1] = slope;
-    out[2] = 2 * half;
-    out[3] = 6 * sixth;
-}
 
 static int function_is_constant(const mhe_function *function) {
     for (int32_t i = 0; i < function->n_pieces; i++) {
@@ -107,7 +84,8 @@ static void frame_along(const double *axis, int column, double *r) {
 }
 
 /* Passes a motion: a constant one moves `at` within its link, a free one begins a new link. */
-static void tree_add_motion(tree *t, const mhe_motion *motion, placement *at) {
+static void tree_add_motion(const mhe_description *d, tree *t, const mhe_motion *motion,
+                            placement *at) {
     double norm = sqrt(dot3(motion->axis, motion->axis));
     double axis[3], turn[9];
     for (int i = 0; i < 3; i++) {
@@ -132,7 +110,8 @@ static void tree_add_motion(tree *t, const mhe_motion *motion, placement *at) {
     frame_along(axis, rotation ? 2 : 0, turn);
     joint->parent = at->link;
     joint->kind = motion->kind;
-    joint->coordinate = motion->coordinate;
+    joint->number = motion->coordinate;
+    joint->coordinate = number_root(d, motion->coordinate);
     joint->function = &motion->function;
     memcpy(joint->p, at->p, sizeof joint->p);
     multiply3(at->r, turn, joint->r);
@@ -204,7 +183,7 @@ static void tree_add_path(tree *t, int32_t muscle, const mhe_path *m, const plac
     for (int32_t k = 0; k < m->n_points; k++) {
         int32_t here = t->n_points++;
         t->points[here] = tree_point_at(places, m->points[k].body, m->points[k].location);
-        if (k == 0) {
+        if (k == 0 || !route_is_plain(m, k - 1)) {
             continue;
         }
         const tree_point *a = &t->points[here - 1], *b = &t->points[here];
@@ -261,7 +240,7 @@ static void tree_build(const mhe_description *d, tree *t) {
         placement at = body->parent < 0 ? ground : places[body->parent];
         placement_move(&at, body->joint_r, body->joint_p);
         for (int32_t k = 0; k < body->n_motions; k++) {
-            tree_add_motion(t, &body->motions[k], &at);
+            tree_add_motion(d, t, &body->motions[k], &at);
         }
         placement_move(&at, body->body_r, body->body_p);
         tree_add_mass(t, body, &at);

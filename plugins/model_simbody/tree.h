@@ -16,7 +16,8 @@ extern "C" {
 typedef struct tree_joint {
     int32_t parent; /* link that carries the joint */
     int32_t kind;
-    int32_t coordinate;           /* its value is function(q[coordinate]) */
+    int32_t number;               /* its value is function(coordinate of that number) */
+    int32_t coordinate;           /* the free one that it is a function of */
     const mhe_function *function; /* the description's */
     double r[9], p[3];            /* joint frame in the parent link */
     double mass, com[3];          /* of the moved link, in its own frame */
@@ -68,10 +69,9 @@ void tree_free(tree *tree);
 /* What tree_create() checks: references, shapes and numbers of the description before it is
  * reduced; that every coordinate moves mass after. MHE_E_INPUT names the part. [cold] */
 mhe_status tree_check_description(const mhe_description *description, mhe_error *err);
+mhe_status check_dependents(const mhe_description *description, mhe_error *err);
+mhe_status check_paths(const mhe_description *description, mhe_error *err);
 mhe_status tree_check_joints(const tree *tree, const mhe_description *description, mhe_error *err);
-
-/* out [4] = f(t), f'(t), f''(t), f'''(t) */
-void function_evaluate(const mhe_function *function, double t, double *out);
 
 #ifdef __cplusplus
 }

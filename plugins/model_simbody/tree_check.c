@@ -68,7 +68,8 @@ static mhe_status check_body(const mhe_description *d, int32_t i, mhe_error *err
         }
     }
     for (int32_t k = 0; k < body->n_motions; k++) {
-        mhe_status status = check_motion(&body->motions[k], d->n_coordinates, body->name, err);
+        mhe_status status =
+            check_motion(&body->motions[k], d->n_coordinates + d->n_dependents, body->name, err);
         if (status != MHE_OK) {
             return status;
         }
@@ -83,6 +84,10 @@ static int is_place(const mhe_description *d, int32_t body, const double *locati
 mhe_status tree_check_description(const mhe_description *d, mhe_error *err) {
     if (!all_finite(d->gravity, 3)) {
         return mhe_fail(err, MHE_E_INPUT, "gravity is not finite");
+    }
+    mhe_status sound = check_dependents(d, err);
+    if (sound != MHE_OK) {
+        return sound;
     }
     for (int32_t i = 0; i < d->n_bodies; i++) {
         mhe_status status = check_body(d, i, err);
@@ -100,18 +105,7 @@ mhe_status tree_check_description(const mhe_description *d, mhe_error *err) {
         return mhe_fail(err, MHE_E_INPUT, "%d muscles, but %d paths", (int)d->n_muscles,
                         (int)d->n_paths);
     }
-    for (int32_t i = 0; i < d->n_muscles; i++) {
-        const mhe_path *m = &d->paths[i];
-        int valid = m->n_points >= 2;
-        for (int32_t k = 0; k < m->n_points; k++) {
-            valid = valid && m->points[k].kind == MHE_POINT_FIXED &&
-                    is_place(d, m->points[k].body, m->points[k].location);
-        }
-        if (!valid) {
-            return mhe_fail(err, MHE_E_INPUT, "muscle '%s': its path is not valid", m->name);
-        }
-    }
-    return MHE_OK;
+    return check_paths(d, err);
 }
 
 static mhe_status check_joint_frames(const tree *t, const mhe_description *d, mhe_error *err) {

@@ -107,9 +107,10 @@ typedef struct mhe_path_point {
     1                            /* size[0]: radius, size[1]: length along z (paths off its ends \
                                   * do not wrap); axis z */
 #define MHE_OBSTACLE_ELLIPSOID 2 /* size[0..2]: half axes */
-#define MHE_OBSTACLE_TORUS                                             \
-    3 /* size[0]: radius of the hole (OpenSim: inner_radius), size[1]: \
-       * outer radius; axis z. The path passes through the hole */
+#define MHE_OBSTACLE_TORUS                                                        \
+    3 /* size[0]: radius of the tube (OpenSim's inner_radius), size[1]: of the    \
+       * circle in its middle (outer_radius); axis z. The path passes through the \
+       * hole */
 typedef struct mhe_obstacle {
     const char *name;
     int32_t kind; /* MHE_OBSTACLE_* */

@@ -1,0 +1,437 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* course.c: which points a path passes and which obstacles it touches, in which order.
+ *
+ * As OpenSim has it: the obstacles are taken in the order listed; each is tried with every piece of
+ * the path as it is so far, within its range of points; the first piece that crosses it wraps, or
+ * else the one that gets least longer. With several obstacles this is repeated until it stays the
+ * same. Strings in a row then are pulled tight together: the point where the path passes between
+ * two of them is moved across the path until both pull along one line (Newton's method, with the
+ * second derivatives of wrap.h). Nothing is remembered from call to call. */
+#include "numbers.h"
+#include "route.h"
+#include "vector.h"
+
+#include <math.h>
+#include <string.h>
+
+#define EDGE 1e-5 /* rad (m): a conditional point's range is that much wider, as in OpenSim */
+#define MAX_PASSES 8
+#define MAX_NEWTON 20
+#define TIGHT 1e-13  /* m: last step of Newton's method */
+#define LONGEST 0.02 /* m: longest step */
+
+static void link_place(const path_pose *pose, int32_t link, const double *at, double *out) {
+    if (link < 0) {
+        memcpy(out, at, 3 * sizeof *out);
+    } else {
+        place3(pose->r + 9 * link, pose->p + 3 * link, at, out);
+    }
+}
+
+static int point_is_on(const mhe_path_point *point, const double *numbers) {
+    if (point->kind != MHE_POINT_CONDITIONAL) {
+        return 1;
+    }
+    double value = numbers[4 * point->coordinate[0]];
+    return value >= point->lower - EDGE && value <= point->upper + EDGE;
+}
+
+/* Places point k, and keeps the slopes of what moves it. */
+static void place_point(const path_route *route, int32_t k, const path_pose *pose, const double *numbers,
+                        route_work *work) {
+    const route_point *point = &route->points[k];
+    double at[3] = {point->at[0], point->at[1], point->at[2]};
+    if (point->source->kind == MHE_POINT_MOVING) {
+        double *slopes = work->slopes + 12 * k;
+        memset(slopes, 0, 12 * sizeof *slopes);
+        memcpy(at, point->source->location, sizeof at);
+        for (int i = 0; i < 3; i++) {
+            if (point->source->coordinate[i] >= 0) {
+                function_compose(&point->source->function[i],
+                                 numbers + 4 * point->source->coordinate[i], slopes + 4 * i);
+                at[i] = slopes[4 * i];
+            }
+        }
+        place3(point->place->r, point->place->p, at, at);
+    }
+    link_place(pose, point->place->link, at, work->places + 3 * k);
+}
+
+static void place_obstacle(const route_wrap *wrap, const path_pose *pose, double *out) {
+    link_place(pose, wrap->link, wrap->p, out + 9);
+    if (wrap->link < 0) {
+        memcpy(out, wrap->r, sizeof wrap->r);
+    } else {
+        multiply3(pose->r + 9 * wrap->link, wrap->r, out);
+    }
+}
+
+/* out = r^T (at - p) */
+static void into_frame(const double *frame, const double *at, double *out) {
+    double d[3] = {at[0] - frame[9], at[1] - frame[10], at[2] - frame[11]};
+    for (int i = 0; i < 3; i++) {
+        out[i] = frame[i] * d[0] + frame[3 + i] * d[1] + frame[6 + i] * d[2];
+    }
+}
+
+/* The string of wrap w between two points of ground, in ground. */
+static int string_between(const path_route *route, int32_t w, const double *p, const double *s,
+                          const route_work *work, wrap_string *out) {
+    const double *frame = work->obstacles + 12 * w;
+    double ends[2][3];
+    into_frame(frame, p, ends[0]);
+    into_frame(frame, s, ends[1]);
+    int state = wrap_solve(&route->wraps[w].surface, ends[0], ends[1], out);
+    if (state > 0) {
+        place3(frame, frame + 9, out->a, out->a);
+        place3(frame, frame + 9, out->b, out->b);
+        for (int k = 0; k < 2; k++) {
+            rotate3(frame, out->t[k], out->t[k]);
+            rotate3(frame, out->n[k], out->n[k]);
+        }
+    }
+    return state;
+}
+
+/* ---- which obstacle where ---- */
+
+static void stops_remove(route_work *work, int32_t w) {
+    int32_t n = 0;
+    for (int32_t i = 0; i < work->n_stops; i++) {
+        if (work->stops[i].wrap != w) {
+            work->stops[n++] = work->stops[i];
+        }
+    }
+    work->n_stops = n;
+}
+
+static void stops_insert(route_work *work, int32_t after, int32_t w, int32_t link) {
+    memmove(work->stops + after + 3, work->stops + after + 1,
+            sizeof *work->stops * (size_t)(work->n_stops - after - 1));
+    for (int32_t k = 0; k < 2; k++) {
+        course_stop *stop = &work->stops[after + 1 + k];
+        *stop = (course_stop){.point = -1, .wrap = w, .link = link};
+        memcpy(stop->at, k ? work->strings[w].b : work->strings[w].a, sizeof stop->at);
+    }
+    work->n_stops += 2;
+}
+
+/* First and last stop of the wrap's range of points; 0: there is a piece between them. */
+static int stops_range(const route_wrap *wrap, const route_work *work, int32_t *from, int32_t *to) {
+    *from = -1;
+    *to = -1;
+    for (int32_t i = 0; i < work->n_stops; i++) {
+        int32_t point = work->stops[i].point;
+        if (point < 0 || (wrap->first >= 0 && point < wrap->first) ||
+            (wrap->last >= 0 && point > wrap->last)) {
+            continue;
+        }
+        *from = *from < 0 ? i : *from;
+        *to = i;
+    }
+    return *from >= 0 && *to > *from ? 0 : -1;
+}
+
+static double distance3(const double *a, const double *b) {
+    double d[3] = {b[0] - a[0], b[1] - a[1], b[2] - a[2]};
+    return sqrt(dot3(d, d));
+}
+
+/* Puts wrap w where it belongs in the course without it. */
+static void wrap_insert(const path_route *route, int32_t w, route_work *work) {
+    const route_wrap *wrap = &route->wraps[w];
+    int32_t from, to, best = -1;
+    double least = INFINITY, *tried = work->tried + 6 * w, ends[6];
+    wrap_string string, chosen = work->strings[w];
+    int32_t before = work->state[w];
+    stops_remove(work, w);
+    work->state[w] = WRAP_NONE;
+    if (stops_range(wrap, work, &from, &to) != 0) {
+        return;
+    }
+    for (int32_t i = from; i < to; i++) {
+        const course_stop *a = &work->stops[i], *b = &work->stops[i + 1];
+        if (a->wrap >= 0 && a->wrap == b->wrap) {
+            continue;
+        }
+        int32_t state;
+        if (before > 0 && memcmp(tried, a->at, sizeof a->at) == 0 &&
+            memcmp(tried + 3, b->at, sizeof b->at) == 0) {
+            state = before;
+            string = work->strings[w];
+        } else {
+            state = string_between(route, w, a->at, b->at, work, &string);
+        }
+        if (best < 0 && work->state[w] != WRAP_INSIDE) {
+            work->state[w] = state; /* of what does not wrap, the first that is inside is told */
+        }
+        double longer = state > 0 ? wrap_length(&string) - distance3(a->at, b->at) : INFINITY;
+        if (state == WRAP_CROSSED || longer < least) {
+            least = longer;
+            best = i;
+            chosen = string;
+            work->state[w] = state;
+            memcpy(ends, a->at, sizeof a->at);
+            memcpy(ends + 3, b->at, sizeof b->at);
+        }
+        if (state == WRAP_CROSSED) {
+            break;
+        }
+    }
+    if (best >= 0) {
+        work->strings[w] = chosen;
+        memcpy(tried, ends, sizeof ends);
+        stops_insert(work, best, w, wrap->link);
+    }
+}
+
+/* A number that tells one order of stops from another. */
+static uint64_t stops_digest(const route_work *work) {
+    uint64_t digest = 1469598103934665603u;
+    for (int32_t i = 0; i < work->n_stops; i++) {
+        digest ^= (uint64_t)(uint32_t)(work->stops[i].point + 1) * 257u +
+                  (uint64_t)(uint32_t)(work->stops[i].wrap + 1);
+        digest *= 1099511628211u;
+    }
+    return digest;
+}
+
+/* Strings that follow each other without a point between them. */
+static int stop_joins(const route_work *work, int32_t i) {
+    return i + 1 < work->n_stops && work->stops[i].wrap >= 0 && work->stops[i + 1].wrap >= 0 &&
+           work->stops[i].wrap != work->stops[i + 1].wrap;
+}
+
+static int course_has_joints(const route_work *work) {
+    for (int32_t i = 0; i < work->n_stops; i++) {
+        if (stop_joins(work, i)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static void wraps_insert(const path_route *route, route_work *work) {
+    uint64_t last = 0;
+    for (int32_t w = 0; w < route->n_wraps; w++) {
+        work->order[w] = w;
+        work->state[w] = WRAP_NONE;
+    }
+    for (int32_t pass = 0; pass < MAX_PASSES; pass++) {
+        for (int32_t k = 0; k < route->n_wraps; k++) {
+            wrap_insert(route, work->order[k], work);
+        }
+        uint64_t digest = stops_digest(work);
+        if (route->n_wraps < 2 || (digest == last && (pass > 1 || !course_has_joints(work)))) {
+            return;
+        }
+        last = digest;
+        if (pass == 0 && work->state[0] == WRAP_NONE && work->state[1] == WRAP_INSIDE) {
+            work->order[0] = 1; /* what the first is in the way of comes first */
+            work->order[1] = 0;
+        }
+    }
+}
+
+/* ---- strings in a row ---- */
+
+static void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
+    const course_stop *a = &work->stops[stop], *b = &work->stops[stop + 1];
+    double u[3], least[3] = {0, 0, 0}, norm = 0;
+    for (int i = 0; i < 3; i++) {
+        joint->at[i] = 0.5 * (a->at[i] + b->at[i]);
+        u[i] = b->at[i] - a->at[i];
+    }
+    norm = sqrt(dot3(u, u));
+    for (int i = 0; i < 3; i++) { /* (nearly no distance: along the string) */
+        u[i] = norm > 1e-9 ? u[i] / norm : work->strings[a->wrap].t[1][i];
+    }
+    int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2)
+                                     : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
+    least[k] = 1;
+    cross3(u, least, joint->across[0]);
+    norm = sqrt(dot3(joint->across[0], joint->across[0]));
+    for (int i = 0; i < 3; i++) {
+        joint->across[0][i] /= norm;
+    }
+    cross3(u, joint->across[0], joint->across[1]);
+    joint->link = a->link;
+}
+
+static double quadratic(const double *m, const double *a, const double *b) {
+    double mb[3];
+    rotate3(m, b, mb);
+    return dot3(a, mb);
+}
+
+/* Gradient and second derivatives of one string (or straight piece) by its ends. */
+void string_derivatives(const wrap_string *string, const double *p, const double *s, double *g,
+                        double *pp, double *ps, double *ss) {
+    if (string != NULL) {
+        for (int i = 0; i < 3; i++) {
+            g[i] = -string->t[0][i];
+            g[3 + i] = string->t[1][i];
+        }
+        wrap_curvature(string, pp, ps, ss);
+        return;
+    }
+    double u[3] = {s[0] - p[0], s[1] - p[1], s[2] - p[2]}, l = sqrt(dot3(u, u));
+    double inverse = l < 1e-9 ? 0 : 1 / l;
+    for (int i = 0; i < 3; i++) {
+        u[i] *= inverse;
+        g[i] = -u[i];
+        g[3 + i] = u[i];
+    }
+    memset(pp, 0, 9 * sizeof *pp);
+    for (int i = 0; i < 3; i++) {
+        pp[4 * i] = inverse;
+    }
+    add_outer3(pp, -inverse, u, u);
+    for (int i = 0; i < 9; i++) {
+        ss[i] = pp[i];
+        ps[i] = -pp[i];
+    }
+}
+
+/* Adds a string's share to Newton's equations [2 n x (2 n + 1)]; joints -1: an end that stays. */
+static void newton_add(const route_work *work, int32_t stride, const wrap_string *string,
+                       const double *const ends[2], const int32_t joints[2], double *equations) {
+    double g[6], second[3][9];
+    string_derivatives(string, ends[0], ends[1], g, second[0], second[1], second[2]);
+    for (int e = 0; e < 2; e++) {
+        if (joints[e] < 0) {
+            continue;
+        }
+        const course_joint *own = &work->joints[joints[e]];
+        for (int i = 0; i < 2; i++) {
+            double *row = equations + (2 * joints[e] + i) * stride;
+            row[stride - 1] -= dot3(own->across[i], g + 3 * e);
+            for (int j = 0; j < 2; j++) {
+                row[2 * joints[e] + j] +=
+                    quadratic(second[e ? 2 : 0], own->across[i], own->across[j]);
+                if (joints[1 - e] >= 0) {
+                    const double *other = work->joints[joints[1 - e]].across[j];
+                    row[2 * joints[1 - e] + j] += e ? quadratic(second[1], other, own->across[i])
+                                                    : quadratic(second[1], own->across[i], other);
+                }
+            }
+        }
+    }
+}
+
+/* Solves the n equations, each row with its right-hand side; 0: done. */
+static int newton_solve(double *m, int32_t n) {
+    int32_t stride = n + 1;
+    for (int32_t i = 0; i < n; i++) {
+        if (!(m[i * stride + i] > 0)) {
+            return -1;
+        }
+        for (int32_t k = i + 1; k < n; k++) {
+            double factor = m[k * stride + i] / m[i * stride + i];
+            for (int32_t j = i; j <= n; j++) {
+                m[k * stride + j] -= factor * m[i * stride + j];
+            }
+        }
+    }
+    for (int32_t i = n - 1; i >= 0; i--) {
+        for (int32_t k = i + 1; k < n; k++) {
+            m[i * stride + n] -= m[i * stride + k] * m[k * stride + n];
+        }
+        m[i * stride + n] /= m[i * stride + i];
+    }
+    return 0;
+}
+
+/* The course as pieces between points and joints. */
+static void pieces_make(const path_route *route, route_work *work) {
+    int32_t joint = -1; /* where the next piece begins, unless at a point */
+    work->n_pieces = work->n_joints = 0;
+    for (int32_t i = 0; i + 1 < work->n_stops; i++) {
+        const course_stop *a = &work->stops[i], *b = &work->stops[i + 1];
+        course_piece piece = {.wrap = -1, .point = {a->point, b->point}, .joint = {-1, -1}};
+        if (a->point >= 0 && b->point >= 0) {
+            if (b->point != a->point + 1 || !route->plain[a->point]) {
+                work->pieces[work->n_pieces++] = piece;
+            }
+            continue;
+        }
+        if (b->wrap < 0 || (i + 2 < work->n_stops && work->stops[i + 2].wrap != b->wrap)) {
+            continue; /* from a string's end: part of its piece */
+        }
+        const course_stop *after = &work->stops[i + 3];
+        piece.wrap = b->wrap;
+        piece.joint[0] = a->point >= 0 ? -1 : joint;
+        piece.point[1] = after->point;
+        if (after->point < 0) {
+            joint = work->n_joints++;
+            piece.joint[1] = joint;
+            joint_begin(work, i + 2, &work->joints[joint]);
+        }
+        work->pieces[work->n_pieces++] = piece;
+        i++; /* to the string's first end; the loop goes on at its second */
+    }
+}
+
+void piece_ends(const route_work *work, const course_piece *piece, const double *ends[2]) {
+    for (int e = 0; e < 2; e++) {
+        ends[e] = piece->joint[e] >= 0 ? work->joints[piece->joint[e]].at
+                                       : work->places + 3 * piece->point[e];
+    }
+}
+
+/* Moves the joints until the strings are tight. */
+static void joints_tighten(const path_route *route, route_work *work) {
+    int32_t n = 2 * work->n_joints, stride = n + 1;
+    for (int32_t k = 0; k <= MAX_NEWTON; k++) {
+        memset(work->newton, 0, sizeof *work->newton * (size_t)(n * stride));
+        for (int32_t i = 0; i < work->n_pieces; i++) {
+            const course_piece *piece = &work->pieces[i];
+            if (piece->joint[0] < 0 && piece->joint[1] < 0) {
+                continue;
+            }
+            const double *ends[2];
+            int32_t w = piece->wrap;
+            piece_ends(work, piece, ends);
+            work->state[w] = string_between(route, w, ends[0], ends[1], work, &work->strings[w]);
+            newton_add(work, stride, work->state[w] > 0 ? &work->strings[w] : NULL, ends,
+                       piece->joint, work->newton);
+        }
+        double step = 0;
+        if (k == MAX_NEWTON || newton_solve(work->newton, n) != 0) {
+            return;
+        }
+        for (int32_t j = 0; j < n; j++) {
+            step = fmax(step, fabs(work->newton[j * stride + n]));
+        }
+        if (step < TIGHT) {
+            return;
+        }
+        double share = step > LONGEST ? LONGEST / step : 1;
+        for (int32_t j = 0; j < n; j++) {
+            course_joint *joint = &work->joints[j / 2];
+            add3(joint->at, share * work->newton[j * stride + n], joint->across[j % 2]);
+        }
+    }
+}
+
+void course_find(const path_route *route, const path_pose *pose, const double *numbers,
+                 route_work *work) {
+    work->n_stops = 0;
+    for (int32_t k = 0; k < route->n_points; k++) {
+        if (!point_is_on(route->points[k].source, numbers)) {
+            continue;
+        }
+        place_point(route, k, pose, numbers, work);
+        course_stop *stop = &work->stops[work->n_stops++];
+        *stop = (course_stop){.point = k, .wrap = -1, .link = route->points[k].place->link};
+        memcpy(stop->at, work->places + 3 * k, sizeof stop->at);
+    }
+    for (int32_t w = 0; w < route->n_wraps; w++) {
+        place_obstacle(&route->wraps[w], pose, work->obstacles + 12 * w);
+    }
+    wraps_insert(route, work);
+    pieces_make(route, work);
+    if (work->n_joints > 0) {
+        joints_tighten(route, work);
+    }
+}

@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* route.h: what of a path is not a straight line between points that stay where they are: moving
+ * and conditional points, obstacles, lengths by a polynomial.
+ *
+ * A route is evaluated in two steps. Its course says which points are on and which obstacle the
+ * path touches where (course.c); its pieces then give length and derivatives (strand.c). */
+#ifndef SIMBODY_ROUTE_H
+#define SIMBODY_ROUTE_H
+
+#include "path.h"
+#include "wrap/wrap.h"
+
+#define POLYNOMIAL_POWERS 16 /* exponents are less */
+#define POLYNOMIAL_FACTORS 8 /* coordinates that one term may depend on */
+
+typedef struct route_point {
+    const mhe_path_point *source;
+    const tree_place *place; /* of the point's body */
+    double at[3];            /* in the link's frame; of a moving one, without what moves */
+    int32_t local[3];        /* of a moving one: place of each function's root in `own`; -1 */
+} route_point;
+
+typedef struct route_wrap {
+    wrap_surface surface;
+    int32_t link, first, last; /* points */
+    double r[9], p[3];         /* frame in the link */
+} route_wrap;
+
+typedef struct route {
+    int32_t path, n_points, n_wraps, n_own;
+    const mhe_polynomial *length; /* instead of points */
+    int32_t *length_local;        /* [length->n] places in own */
+    int32_t degree;               /* largest exponent */
+    route_point *points;
+    uint8_t *plain; /* [n_points]: 1 where the piece from this point to the next is a segment of the
+                     * tree (and counted there) */
+    route_wrap *wraps;
+    int32_t *own;   /* [n_own]: free coordinates that the length depends on */
+    int32_t *local; /* [n_q]: place in own; -1 */
+} path_route;
+
+/* One step of the way from an obstacle (or link) out to a point: how the point moves with a
+ * coordinate, as seen from there, in ground axes. */
+typedef struct strand_step {
+    int32_t local;    /* of the coordinate */
+    double change[3]; /* first derivative */
+    double curve[3];  /* by f'' of the step's function */
+    double turn[3];   /* slope times axis of a pin: turns the steps beyond; 0 of a slider */
+} strand_step;
+
+/* A stop of the course: a point that is on, or an end of a string on an obstacle. */
+typedef struct course_stop {
+    int32_t point, wrap; /* -1: not one */
+    int32_t link;
+    double at[3];
+} course_stop;
+
+/* Where the string passes between two obstacles: a point that is free across the string. */
+typedef struct course_joint {
+    int32_t link;
+    double at[3], across[2][3];
+} course_joint;
+
+/* A straight piece between two points, or a string over an obstacle, which ends at points or
+ * joints.
+ */
+typedef struct course_piece {
+    int32_t wrap;     /* -1: straight; so it is also where work->state[wrap] <= 0 */
+    int32_t point[2]; /* of the ends */
+    int32_t joint[2]; /* instead of points; -1: none */
+} course_piece;
+
+/* Scratch of one thread, large enough for every route of the model. */
+typedef struct route_work {
+    void *memory;
+    double *places;     /* [n_points x 3] in ground */
+    double *slopes;     /* [n_points x 3 x 4] of moving points */
+    course_stop *stops; /* [n_points + 2 n_wraps] */
+    int32_t n_stops;
+    double *obstacles;    /* [n_wraps x 12]: rotation and origin in ground */
+    wrap_string *strings; /* [n_wraps], in ground */
+    int32_t *state;       /* [n_wraps] of wrap_solve() */
+    double *tried;        /* [n_wraps x 6]: the ends that these are of */
+    int32_t *order;       /* [n_wraps] */
+    course_joint *joints; /* [n_wraps] */
+    course_piece *pieces; /* [n_points + 2 n_wraps] */
+    int32_t n_joints, n_pieces;
+    double *newton; /* [(2 n_wraps) x (2 n_wraps + 1)] */
+    strand_step *steps[2];
+    double *gradient, *hessian; /* of a route, with the joints' freedoms */
+    double *polynomial;         /* scratch */
+} route_work;
+
+typedef struct route_set {
+    /* routes; most of each in one of them */
+    int32_t n, n_points, n_wraps, n_own, n_steps, n_factors;
+    path_route *routes;
+} route_set;
+
+/* The routes of a description whose tree is made. MHE_E_MEMORY. [cold] */
+mhe_status routes_create(const mhe_description *description, const tree *tree, route_set **out,
+                         mhe_error *err);
+void routes_free(route_set *routes);
+/* Whether the piece between points k and k + 1 of a path is straight and between fixed points. */
+int route_is_plain(const mhe_path *path, int32_t k);
+
+mhe_status route_work_create(const route_set *routes, route_work *out);
+void route_work_free(route_work *work);
+
+/* Adds the routes to what path_lengths() wrote; NULL: not wanted. `numbers`: as
+ * numbers_evaluate(). */
+void routes_lengths(const tree *tree, const route_set *routes, const path_pose *pose,
+                    const double *numbers, route_work *work, double *length, double *length_q,
+                    double *length_qq);
+
+/* ---- between the files of this part ---- */
+
+/* Places the points and finds the course: work->stops, strings, joints. */
+void course_find(const path_route *route, const path_pose *pose, const double *numbers,
+                 route_work *work);
+
+/* Ends of a piece in ground. */
+void piece_ends(const route_work *work, const course_piece *piece, const double *ends[2]);
+
+/* Gradient [6] and second derivatives of a string (NULL: straight) by its ends, all in ground. */
+void string_derivatives(const wrap_string *string, const double *p, const double *s, double *g,
+                        double *pp, double *ps, double *ss);
+
+/* Length of the course found, with gradient and hessian (NULL: not wanted; rows of *stride) by the
+ * own coordinates. */
+double strand_length(const tree *tree, const path_route *route, const path_pose *pose, route_work *work,
+                     int32_t *stride, double *gradient, double *hessian);
+
+/* Length, gradient [n_own] and hessian [n_own x n_own] (both NULL: not wanted). */
+double polynomial_length(const path_route *route, const double *numbers, double *scratch,
+                         double *gradient, double *hessian);
+
+#endif

@@ -1,0 +1,409 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Lengths and their gradients against OpenSim 4.5.1, and sweeps of every coordinate. With an
+ * argument, the name of a model: the same for it alone, with every path that is far off. */
+#include "test_models.h"
+
+#include "io/model_file.h"
+#include "numbers.h"
+
+#include <cjson/cJSON.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MAX_Q 64
+#define MAX_P 128
+#define JUMP 1e-3 /* m */
+#define SWEEP 400
+
+static const char *const models[] = {"arm26",
+                                     "gait10dof18musc",
+                                     "subject01_metabolics_path_spring",
+                                     "gait2354_simbody",
+                                     "gait2392_thelen2003muscle",
+                                     "gait2392_millard2012muscle",
+                                     "FullBodyModel_Hamner2010_v2_0",
+                                     "leg39",
+                                     "Rajagopal2016",
+                                     "RajagopalLaiUhlrich2023",
+                                     "wrist",
+                                     "Tug_of_War_Millard",
+                                     "MOBL_ARMS_41",
+                                     "Wu_Shoulder_Model_via_points",
+                                     "ThoracoscapularShoulderModel",
+                                     "HYOID",
+                                     "testMomentArmsConstraintA",
+                                     "testMomentArmsConstraintB",
+                                     "PathOnConstrainedBodyMomentArmTest",
+                                     "MovingPathPointMomentArmTest",
+                                     "MultipleMPPsMomentArmTest",
+                                     "CoupledCoordinatesMPPsMomentArmTest",
+                                     "WrapPathCustomJointMomentArmTest",
+                                     "P2PBallJointMomentArmTest",
+                                     "toyLigamentModel"};
+#define N_MODELS ((int)(sizeof models / sizeof models[0]))
+
+static int verbose;
+
+typedef struct subject {
+    const char *name;
+    mhe_description *description;
+    cJSON *oracle;
+    test_instance instance;
+    int32_t n_q, n_p;
+    double *length, *length_q;
+} subject;
+
+static cJSON *read_json(const char *file) {
+    char path[1024], *text = NULL;
+    if (test_data_path(path, sizeof path, file) == NULL) {
+        skip();
+    }
+    FILE *in = fopen(path, "rb");
+    assert_non_null(in);
+    assert_int_equal(fseek(in, 0, SEEK_END), 0);
+    long size = ftell(in);
+    rewind(in);
+    text = malloc((size_t)size + 1);
+    assert_non_null(text);
+    assert_int_equal(fread(text, 1, (size_t)size, in), size);
+    (void)fclose(in);
+    cJSON *json = cJSON_ParseWithLength(text, (size_t)size);
+    free(text);
+    assert_non_null(json);
+    return json;
+}
+
+static void subject_open(const char *name, subject *out) {
+    char file[256], path[1024];
+    mhe_error err = {0};
+    memset(out, 0, sizeof *out);
+    out->name = name;
+    (void)snprintf(file, sizeof file, "opensim/%s.oracle.json", name);
+    out->oracle = read_json(file);
+    (void)snprintf(file, sizeof file, "opensim/%s.osim", name);
+    assert_non_null(test_data_path(path, sizeof path, file));
+    if (mhi_model_read(path, &out->description, &err) != MHE_OK) {
+        fail_msg("%s", err.text);
+    }
+    test_open(&out->instance, out->description, 0);
+    out->n_q = out->description->n_coordinates;
+    out->n_p = out->description->n_paths;
+    assert_true(out->n_q <= MAX_Q && out->n_p <= MAX_P);
+    out->length = calloc((size_t)(out->n_p + 1), sizeof *out->length);
+    out->length_q = calloc((size_t)(out->n_p * out->n_q + 1), sizeof *out->length_q);
+    assert_non_null(out->length);
+    assert_non_null(out->length_q);
+}
+
+static void subject_close(subject *s) {
+    test_close(&s->instance);
+    mhi_description_free(s->description);
+    cJSON_Delete(s->oracle);
+    free(s->length);
+    free(s->length_q);
+}
+
+static void evaluate(subject *s, const double *q) {
+    double still[MAX_Q] = {0};
+    mhe_kinematics out = {.size = sizeof out, .length = s->length, .length_q = s->length_q};
+    mhe_error err = {0};
+    if (s->instance.ops->kinematics(s->instance.context, q, still, &out, &err) != MHE_OK) {
+        fail_msg("%s: %s", s->name, err.text);
+    }
+}
+
+/* ---- against the oracle ---- */
+
+enum { FREE, SPHERE, CYLINDER, ELLIPSOID, TORUS, SEVERAL, N_CLASSES };
+static const char *const class_names[] = {"no wrap",   "sphere", "cylinder",
+                                          "ellipsoid", "torus",  "several"};
+
+typedef struct tally {
+    int n;
+    double off[4096];  /* m, of lengths: ours - theirs */
+    double gradient;   /* worst of -dL/dq, m */
+} tally;
+
+static int wrap_class(const subject *s, const cJSON *line) {
+    const cJSON *wraps = cJSON_GetObjectItem(line, "wraps");
+    int n = cJSON_GetArraySize(wraps) / 2;
+    if (n != 1) {
+        return n == 0 ? FREE : SEVERAL;
+    }
+    const char *name = cJSON_GetArrayItem(cJSON_GetArrayItem(wraps, 0), 0)->valuestring;
+    for (int32_t i = 0; i < s->description->n_obstacles; i++) {
+        if (strcmp(s->description->obstacles[i].name, name) == 0) {
+            return SPHERE + s->description->obstacles[i].kind;
+        }
+    }
+    return SEVERAL;
+}
+
+/* d(coordinate named)/d(each free one) in `row`; 0: found. */
+static int coordinate_row(const subject *s, const char *name, const double *numbers, double *row) {
+    const mhe_description *d = s->description;
+    memset(row, 0, sizeof *row * (size_t)s->n_q);
+    for (int32_t i = 0; i < d->n_coordinates + d->n_dependents; i++) {
+        const mhe_coordinate *c = i < d->n_coordinates
+                                      ? &d->coordinates[i]
+                                      : &d->dependents[i - d->n_coordinates].coordinate;
+        if (strcmp(c->name, name) == 0) {
+            row[number_root(d, i)] = numbers[4 * i + 1];
+            return 0;
+        }
+    }
+    return -1;
+}
+
+/* Speeds of these joints are no derivatives of their coordinates. */
+static int speeds_differ(const subject *s, const char *coordinate) {
+    const cJSON *c;
+    cJSON_ArrayForEach(c, cJSON_GetObjectItem(s->oracle, "coordinates")) {
+        if (strcmp(cJSON_GetObjectItem(c, "name")->valuestring, coordinate) == 0) {
+            const char *type = cJSON_GetObjectItem(c, "joint_type")->valuestring;
+            return strcmp(type, "BallJoint") == 0 || strcmp(type, "FreeJoint") == 0 ||
+                   strcmp(type, "ScapulothoracicJoint") == 0 || strcmp(type, "EllipsoidJoint") == 0;
+        }
+    }
+    return 0;
+}
+
+/* Worst difference of the gradient of path p. */
+static double gradient_off(const subject *s, int32_t p, const cJSON *line, const double *numbers) {
+    double expected[MAX_Q] = {0}, row[MAX_Q], worst = 0;
+    int skip_q[MAX_Q] = {0};
+    const cJSON *item, *better = cJSON_GetObjectItem(line, "minus_dLdq_where_it_differs");
+    cJSON_ArrayForEach(item, cJSON_GetObjectItem(line, "ma_partial")) {
+        const cJSON *other = cJSON_GetObjectItem(better, item->string);
+        double value = other != NULL ? other->valuedouble : item->valuedouble;
+        if (coordinate_row(s, item->string, numbers, row) == 0) {
+            for (int32_t i = 0; i < s->n_q; i++) {
+                expected[i] -= value * row[i];
+                skip_q[i] |= row[i] != 0 && speeds_differ(s, item->string);
+            }
+        }
+    }
+    cJSON_ArrayForEach(item, better) {
+        if (cJSON_GetObjectItem(cJSON_GetObjectItem(line, "ma_partial"), item->string) == NULL &&
+            coordinate_row(s, item->string, numbers, row) == 0) {
+            for (int32_t i = 0; i < s->n_q; i++) {
+                expected[i] -= item->valuedouble * row[i];
+            }
+        }
+    }
+    for (int32_t i = 0; i < s->n_q; i++) {
+        if (!skip_q[i]) {
+            worst = fmax(worst, fabs(s->length_q[p * s->n_q + i] - expected[i]));
+        }
+    }
+    return worst;
+}
+
+static void compare_pose(subject *s, const cJSON *pose, tally *classes) {
+    const mhe_description *d = s->description;
+    const cJSON *at = cJSON_GetObjectItem(pose, "q");
+    double q[MAX_Q], numbers[4 * 2 * MAX_Q];
+    for (int32_t i = 0; i < s->n_q; i++) {
+        const cJSON *value = cJSON_GetObjectItem(at, d->coordinates[i].name);
+        assert_non_null(value);
+        q[i] = value->valuedouble;
+    }
+    evaluate(s, q);
+    numbers_evaluate(d, q, numbers);
+    for (int32_t p = 0; p < s->n_p; p++) {
+        const cJSON *line = cJSON_GetObjectItem(cJSON_GetObjectItem(pose, "lines"), d->paths[p].name);
+        if (line == NULL) {
+            continue;
+        }
+        int class = wrap_class(s, line);
+        double off = s->length[p] - cJSON_GetObjectItem(line, "length")->valuedouble;
+        double gradient = gradient_off(s, p, line, numbers);
+        tally *t = &classes[class];
+        assert_true(t->n < 4096);
+        t->off[t->n++] = off;
+        t->gradient = fmax(t->gradient, gradient);
+        if (verbose && (fabs(off) > (class == FREE ? 1e-8 : 5e-4) ||
+                        (class == FREE && gradient > 1e-7))) {
+            char *wraps = cJSON_PrintUnformatted(cJSON_GetObjectItem(line, "wraps"));
+            print_message("  pose %d %s: %s, off %.3f mm, gradient %.2e, %s\n",
+                          cJSON_GetObjectItem(pose, "pose")->valueint, d->paths[p].name,
+                          class_names[class], 1e3 * off, gradient, wraps ? wraps : "");
+            free(wraps);
+        }
+    }
+}
+
+static int by_size(const void *a, const void *b) {
+    double x = fabs(*(const double *)a), y = fabs(*(const double *)b);
+    return (x > y) - (x < y);
+}
+
+static void report(const char *name, tally *classes) {
+    for (int c = 0; c < N_CLASSES; c++) {
+        tally *t = &classes[c];
+        int longer = 0;
+        for (int i = 0; i < t->n; i++) {
+            longer += t->off[i] > 1e-5;
+        }
+        if (t->n == 0) {
+            continue;
+        }
+        qsort(t->off, (size_t)t->n, sizeof *t->off, by_size);
+        print_message("%-34s %-9s %5d  median %.4f  90%% %.4f  worst %8.3f mm  longer %d  "
+                      "gradient %.1e\n",
+                      name, class_names[c], t->n, 1e3 * fabs(t->off[t->n / 2]),
+                      1e3 * fabs(t->off[t->n * 9 / 10]), 1e3 * t->off[t->n - 1], longer,
+                      t->gradient);
+    }
+}
+
+static void compare_model(const char *name) {
+    static tally classes[N_CLASSES];
+    subject s;
+    memset(classes, 0, sizeof classes);
+    subject_open(name, &s);
+    const cJSON *pose;
+    cJSON_ArrayForEach(pose, cJSON_GetObjectItem(s.oracle, "poses")) {
+        compare_pose(&s, pose, classes);
+    }
+    report(name, classes);
+    tally *none = &classes[FREE];
+    if (!verbose && none->n > 0) {
+        assert_true(fabs(none->off[none->n - 1]) < 1e-8);
+    }
+    subject_close(&s);
+}
+
+/* ---- sweeps ---- */
+
+/* A length of path p may jump where one of its conditional points goes on or off. */
+static int jumps_by_itself(const subject *s, int32_t p, const double *before, const double *after) {
+    const mhe_description *d = s->description;
+    double numbers[2][4 * 2 * MAX_Q];
+    numbers_evaluate(d, before, numbers[0]);
+    numbers_evaluate(d, after, numbers[1]);
+    for (int32_t k = 0; k < d->paths[p].n_points; k++) {
+        const mhe_path_point *point = &d->paths[p].points[k];
+        if (point->kind != MHE_POINT_CONDITIONAL) {
+            continue;
+        }
+        double a = numbers[0][4 * point->coordinate[0]], b = numbers[1][4 * point->coordinate[0]];
+        if ((a >= point->lower && a <= point->upper) != (b >= point->lower && b <= point->upper)) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+/* Between a and b: the largest jump of path p, by bisection for where its length is steepest. */
+static double jump_size(subject *s, int32_t p, const double *a, const double *b) {
+    double ends[2][MAX_Q], value[2];
+    memcpy(ends[0], a, sizeof ends[0]);
+    memcpy(ends[1], b, sizeof ends[1]);
+    for (int e = 0; e < 2; e++) {
+        evaluate(s, ends[e]);
+        value[e] = s->length[p];
+    }
+    for (int k = 0; k < 40; k++) {
+        double middle[MAX_Q];
+        for (int32_t i = 0; i < s->n_q; i++) {
+            middle[i] = 0.5 * (ends[0][i] + ends[1][i]);
+        }
+        evaluate(s, middle);
+        int e = fabs(s->length[p] - value[0]) > fabs(s->length[p] - value[1]); /* keep the larger */
+        memcpy(ends[e], middle, sizeof middle);
+        value[e] = s->length[p];
+        if (e == 1) {
+            continue;
+        }
+    }
+    return value[1] - value[0];
+}
+
+static void sweep_model(const char *name, int *jumps, int *conditional) {
+    subject s;
+    subject_open(name, &s);
+    const mhe_description *d = s.description;
+    double *last = calloc((size_t)s.n_p + 1, sizeof *last);
+    double *slope = calloc((size_t)s.n_p + 1, sizeof *slope);
+    assert_non_null(last);
+    assert_non_null(slope);
+    for (int32_t c = 0; c < s.n_q; c++) {
+        double q[MAX_Q], before[MAX_Q];
+        double lower = d->coordinates[c].lower, upper = d->coordinates[c].upper;
+        double widest = d->coordinates[c].rotational ? 3.141592653589793 : 1;
+        lower = fmax(lower, -widest);
+        upper = fmin(upper, widest);
+        for (int32_t i = 0; i < s.n_q; i++) {
+            q[i] = d->coordinates[i].value;
+        }
+        for (int k = 0; k <= SWEEP; k++) {
+            memcpy(before, q, sizeof before);
+            q[c] = lower + (upper - lower) * k / SWEEP;
+            evaluate(&s, q);
+            for (int32_t p = 0; p < s.n_p && k > 0; p++) {
+                double step = (upper - lower) / SWEEP;
+                double most = fmax(fabs(slope[p]), fabs(s.length_q[p * s.n_q + c])) * step;
+                double change = fabs(s.length[p] - last[p]);
+                if (change > JUMP && change > 1.5 * most) {
+                    double now = s.length[p];
+                    double jump = jump_size(&s, p, before, q);
+                    evaluate(&s, q);
+                    if (fabs(jump) < JUMP) {
+                        continue;
+                    }
+                    int own = jumps_by_itself(&s, p, before, q);
+                    *(own ? conditional : jumps) += 1;
+                    if (!own) {
+                        print_message("  %s: %s jumps by %.2f mm at %s = %.4f (to %.4f)\n", name,
+                                      d->paths[p].name, 1e3 * jump, d->coordinates[c].name, q[c],
+                                      now);
+                    }
+                }
+            }
+            for (int32_t p = 0; p < s.n_p; p++) {
+                last[p] = s.length[p];
+                slope[p] = s.length_q[p * s.n_q + c];
+            }
+        }
+    }
+    free(last);
+    free(slope);
+    subject_close(&s);
+}
+
+static const char *only;
+
+static void lengths_are_those_of_opensim(void **state) {
+    (void)state;
+    for (int i = 0; i < N_MODELS; i++) {
+        if (only == NULL || strcmp(only, models[i]) == 0) {
+            compare_model(models[i]);
+        }
+    }
+}
+
+static void sweeps_do_not_jump(void **state) {
+    (void)state;
+    int jumps = 0, conditional = 0;
+    for (int i = 0; i < N_MODELS; i++) {
+        if (only == NULL || strcmp(only, models[i]) == 0) {
+            sweep_model(models[i], &jumps, &conditional);
+        }
+    }
+    print_message("%d jumps at conditional points, %d others\n", conditional, jumps);
+    assert_int_equal(jumps, 0);
+}
+
+int main(int argc, char **argv) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(lengths_are_those_of_opensim),
+        cmocka_unit_test(sweeps_do_not_jump),
+    };
+    only = argc > 1 ? argv[1] : NULL;
+    verbose = argc > 1;
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
