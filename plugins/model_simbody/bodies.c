@@ -68,5 +68,6 @@ mhe_status simbody_path_pattern(const void *self, uint8_t *pattern, mhe_error *e
             pattern[s->muscle * t->n_q + t->joints[s->joints[i]].coordinate] = 1;
         }
     }
+    routes_pattern(((const simbody_model *)self)->routes, t->n_q, pattern);
     return MHE_OK;
 }

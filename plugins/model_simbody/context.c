@@ -2,7 +2,10 @@
 /* context.c: instances of the model and the memory of their contexts. */
 #include "context.h"
 
+#include <mhe/host.h>
+
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 
 #define PLACEMENT 1e-10 /* m, 1: what rounding may make of long chains */
@@ -38,9 +41,21 @@ static mhe_status check_placement(const tree *t, mhe_error *err) {
     return status;
 }
 
+/* A mass matrix that is singular is no error until accelerations are asked for. */
+static void warn_massless(const mhe_host *host, const simbody_model *model) {
+    for (int32_t i = 0; i < model->tree->n_q && host != NULL; i++) {
+        if (!tree_moves_mass(model->tree, i)) {
+            char text[256];
+            (void)snprintf(text, sizeof text,
+                           "coordinate '%s' moves no mass: no force has an acceleration there",
+                           model->description->coordinates[i].name);
+            host->log(host, MHE_LOG_WARNING, text);
+        }
+    }
+}
+
 mhe_status simbody_create(const mhe_host *host, const mhe_description *description,
                           const void *config, void **self, mhe_error *err) {
-    (void)host;
     const simbody_config *c = config;
     simbody_model *model = calloc(1, sizeof *model);
     if (model == NULL) {
@@ -65,6 +80,7 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
         simbody_destroy(model);
         return status;
     }
+    warn_massless(host, model);
     *self = model;
     return MHE_OK;
 }

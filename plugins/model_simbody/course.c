@@ -14,7 +14,6 @@
 #include <math.h>
 #include <string.h>
 
-#define EDGE 1e-5 /* rad (m): a conditional point's range is that much wider, as in OpenSim */
 #define MAX_PASSES 8
 #define MAX_NEWTON 20
 #define TIGHT 1e-13  /* m: last step of Newton's method */
@@ -33,12 +32,12 @@ static int point_is_on(const mhe_path_point *point, const double *numbers) {
         return 1;
     }
     double value = numbers[4 * point->coordinate[0]];
-    return value >= point->lower - EDGE && value <= point->upper + EDGE;
+    return value >= point->lower && value <= point->upper;
 }
 
 /* Places point k, and keeps the slopes of what moves it. */
-static void place_point(const path_route *route, int32_t k, const path_pose *pose, const double *numbers,
-                        route_work *work) {
+static void place_point(const path_route *route, int32_t k, const path_pose *pose,
+                        const double *numbers, route_work *work) {
     const route_point *point = &route->points[k];
     double at[3] = {point->at[0], point->at[1], point->at[2]};
     if (point->source->kind == MHE_POINT_MOVING) {

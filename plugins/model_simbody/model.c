@@ -173,6 +173,9 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
         path_markers(t, &pose, out->marker, out->marker_q);
     }
     bodies_place(c, out->body, out->body_q);
+    for (int32_t i = 0; i < c->description->n_dependents && out->dependent != NULL; i++) {
+        out->dependent[i] = c->numbers[4 * (t->n_q + i)];
+    }
     return results_finite(t, out) ? MHE_OK
                                   : mhe_fail(err, MHE_RETRY, "a result of the model is not finite");
 }

@@ -20,6 +20,7 @@ static const mhe_model_ops simbody_ops = {
     .forward_dynamics = simbody_forward_dynamics,
     .loads = simbody_loads,
     .path_pattern = simbody_path_pattern,
+    .path_points = simbody_path_points,
 };
 
 static const mhe_plugin simbody_plugin = {

@@ -124,7 +124,8 @@ static void points_make(const tree *t, const mhe_path *path, path_route *out) {
     }
 }
 
-static mhe_status route_make(const mhe_description *d, const tree *t, int32_t index, path_route *out) {
+static mhe_status route_make(const mhe_description *d, const tree *t, int32_t index,
+                             path_route *out) {
     const mhe_path *path = &d->paths[index];
     size_t n_factors = path->n_points == 0 ? (size_t)path->length->n : 0;
     *out = (path_route){.path = index, .n_points = path->n_points, .n_wraps = path->n_wraps};
@@ -202,6 +203,14 @@ void routes_free(route_set *set) {
     }
     free(set->routes);
     free(set);
+}
+
+void routes_pattern(const route_set *set, int32_t n_q, uint8_t *pattern) {
+    for (int32_t i = 0; i < set->n; i++) {
+        for (int32_t k = 0; k < set->routes[i].n_own; k++) {
+            pattern[set->routes[i].path * n_q + set->routes[i].own[k]] = 1;
+        }
+    }
 }
 
 /* ---- scratch ---- */

@@ -104,6 +104,9 @@ void routes_free(route_set *routes);
 /* Whether the piece between points k and k + 1 of a path is straight and between fixed points. */
 int route_is_plain(const mhe_path *path, int32_t k);
 
+/* Marks what the routes depend on in pattern [n_p x n_q]. */
+void routes_pattern(const route_set *routes, int32_t n_q, uint8_t *pattern);
+
 mhe_status route_work_create(const route_set *routes, route_work *out);
 void route_work_free(route_work *work);
 
@@ -112,6 +115,10 @@ void route_work_free(route_work *work);
 void routes_lengths(const tree *tree, const route_set *routes, const path_pose *pose,
                     const double *numbers, route_work *work, double *length, double *length_q,
                     double *length_qq);
+
+/* Points of a path as it runs, for mhe_model_ops.path_points(). */
+int32_t route_points(const path_route *route, const path_pose *pose, const double *numbers,
+                     route_work *work, double *points, int32_t n);
 
 /* ---- between the files of this part ---- */
 
@@ -128,8 +135,8 @@ void string_derivatives(const wrap_string *string, const double *p, const double
 
 /* Length of the course found, with gradient and hessian (NULL: not wanted; rows of *stride) by the
  * own coordinates. */
-double strand_length(const tree *tree, const path_route *route, const path_pose *pose, route_work *work,
-                     int32_t *stride, double *gradient, double *hessian);
+double strand_length(const tree *tree, const path_route *route, const path_pose *pose,
+                     route_work *work, int32_t *stride, double *gradient, double *hessian);
 
 /* Length, gradient [n_own] and hessian [n_own x n_own] (both NULL: not wanted). */
 double polynomial_length(const path_route *route, const double *numbers, double *scratch,

@@ -49,8 +49,8 @@ static void joint_step(const tree *t, const path_route *route, const path_pose *
 }
 
 /* Steps of the way from link `from` to a point at `at` of link `to`; returns their number. */
-static int32_t way_steps(const tree *t, const path_route *route, const path_pose *pose, int32_t from,
-                         int32_t to, const double *at, strand_step *steps) {
+static int32_t way_steps(const tree *t, const path_route *route, const path_pose *pose,
+                         int32_t from, int32_t to, const double *at, strand_step *steps) {
     int32_t meet = common_ancestor(t, from, to), n = 0, outer = 0;
     for (int32_t i = from; i != meet; i = t->joints[i].parent) {
         joint_step(t, route, pose, i, -1, at, &steps[n++]);
@@ -157,9 +157,9 @@ static void cross_add(strand_step *const steps[2], const int32_t *n, const doubl
     }
 }
 
-static double piece_add(const tree *t, const path_route *route, const path_pose *pose, route_work *work,
-                        const course_piece *piece, int32_t stride, double *gradient,
-                        double *hessian) {
+static double piece_add(const tree *t, const path_route *route, const path_pose *pose,
+                        route_work *work, const course_piece *piece, int32_t stride,
+                        double *gradient, double *hessian) {
     const double *ends[2];
     piece_ends(work, piece, ends);
     const wrap_string *string =
@@ -204,8 +204,8 @@ static void eliminate(double *hessian, int32_t n, int32_t n_kept) {
     }
 }
 
-double strand_length(const tree *t, const path_route *route, const path_pose *pose, route_work *work,
-                     int32_t *stride, double *gradient, double *hessian) {
+double strand_length(const tree *t, const path_route *route, const path_pose *pose,
+                     route_work *work, int32_t *stride, double *gradient, double *hessian) {
     int32_t n = route->n_own + 2 * work->n_joints;
     double length = 0;
     *stride = n;

@@ -123,8 +123,8 @@ static const char *const class_names[] = {"no wrap",   "sphere", "cylinder",
 
 typedef struct tally {
     int n;
-    double off[4096];  /* m, of lengths: ours - theirs */
-    double gradient;   /* worst of -dL/dq, m */
+    double off[4096]; /* m, of lengths: ours - theirs */
+    double gradient;  /* worst of -dL/dq, m */
 } tally;
 
 static int wrap_class(const subject *s, const cJSON *line) {
@@ -214,7 +214,8 @@ static void compare_pose(subject *s, const cJSON *pose, tally *classes) {
     evaluate(s, q);
     numbers_evaluate(d, q, numbers);
     for (int32_t p = 0; p < s->n_p; p++) {
-        const cJSON *line = cJSON_GetObjectItem(cJSON_GetObjectItem(pose, "lines"), d->paths[p].name);
+        const cJSON *line =
+            cJSON_GetObjectItem(cJSON_GetObjectItem(pose, "lines"), d->paths[p].name);
         if (line == NULL) {
             continue;
         }
@@ -225,8 +226,8 @@ static void compare_pose(subject *s, const cJSON *pose, tally *classes) {
         assert_true(t->n < 4096);
         t->off[t->n++] = off;
         t->gradient = fmax(t->gradient, gradient);
-        if (verbose && (fabs(off) > (class == FREE ? 1e-8 : 5e-4) ||
-                        (class == FREE && gradient > 1e-7))) {
+        if (verbose &&
+            (fabs(off) > (class == FREE ? 1e-8 : 5e-4) || (class == FREE && gradient > 1e-7))) {
             char *wraps = cJSON_PrintUnformatted(cJSON_GetObjectItem(line, "wraps"));
             print_message("  pose %d %s: %s, off %.3f mm, gradient %.2e, %s\n",
                           cJSON_GetObjectItem(pose, "pose")->valueint, d->paths[p].name,

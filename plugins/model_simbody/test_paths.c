@@ -256,6 +256,30 @@ static void nothing_is_remembered(void **state) {
     }
 }
 
+/* Points along a path lie where its length says. */
+static void points_for_drawing_follow_the_path(void **state) {
+    (void)state;
+    uint64_t seed = 12;
+    for (int trial = 0; trial < 20; trial++) {
+        double q[N_Q], length[N_P], at[64][3];
+        random_pose(&seed, q);
+        assert_int_equal(evaluate(q, length, NULL, NULL), 0);
+        for (int32_t p = 0; p < N_P; p++) {
+            int32_t n = instance.ops->path_points(instance.context, p, at[0], 64);
+            double along = 0;
+            assert_true(n <= 64 && (n >= 2 || paths[p].n_points == 0));
+            for (int32_t k = 1; k < n; k++) {
+                double d[3] = {at[k][0] - at[k - 1][0], at[k][1] - at[k - 1][1],
+                               at[k][2] - at[k - 1][2]};
+                along += sqrt(dot3(d, d));
+            }
+            if (n > 0) { /* chords are a little shorter than arcs */
+                assert_true(along < length[p] + 1e-9 && along > length[p] - 4e-4);
+            }
+        }
+    }
+}
+
 /* Strings in a row: shorter than with one of the two obstacles alone is impossible, and beyond
  * both alone it has to be in some poses. */
 static void obstacles_in_a_row_both_count(void **state) {
@@ -374,6 +398,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(derivatives_are_those_of_the_length),
         cmocka_unit_test(nothing_is_remembered),
+        cmocka_unit_test(points_for_drawing_follow_the_path),
         cmocka_unit_test(obstacles_in_a_row_both_count),
         cmocka_unit_test(couplers_are_carried_by_both_dynamics),
         cmocka_unit_test(senseless_paths_are_refused),

@@ -176,14 +176,23 @@ static void wrong_descriptions_are_refused(void **state) {
     c.points[2].location[1] = INFINITY;
     assert_refused(&c, "path 'm'");
     make_chain(&c);
-    c.bodies[2].mass = 0;
-    assert_refused(&c, "coordinate 'second' moves no mass");
-    make_chain(&c);
     c.bodies[0].body_r[8] = -1;
     assert_refused(&c, "coordinate 'second': its joint's frame is mirrored");
 }
 
 /* As in a shoulder model of biobuddy: one frame swaps two axes, the next swaps them back. */
+static void coordinates_without_mass_are_known(void **state) {
+    (void)state;
+    chain c;
+    tree *t = NULL;
+    make_chain(&c);
+    c.bodies[2].mass = 0;
+    assert_int_equal(tree_create(&c.d, &t, NULL), MHE_OK);
+    assert_true(tree_moves_mass(t, 0));
+    assert_false(tree_moves_mass(t, 1));
+    tree_free(t);
+}
+
 static void frames_with_few_digits_are_noticed(void **state) {
     (void)state;
     chain c;
@@ -217,6 +226,7 @@ int main(void) {
         cmocka_unit_test(only_segments_between_links_remain),
         cmocka_unit_test(functions_and_their_derivatives),
         cmocka_unit_test(wrong_descriptions_are_refused),
+        cmocka_unit_test(coordinates_without_mass_are_known),
         cmocka_unit_test(frames_with_few_digits_are_noticed),
         cmocka_unit_test(mirrored_frames_that_cancel_are_allowed),
     };

@@ -62,16 +62,18 @@ typedef struct tree {
 } tree;
 
 /* Reduces `description`, which must outlive the tree. MHE_E_INPUT: the description is not
- * consistent, or a coordinate moves no mass; MHE_E_MEMORY. [cold] */
+ * consistent; MHE_E_MEMORY. [cold] */
 mhe_status tree_create(const mhe_description *description, tree **out, mhe_error *err);
 void tree_free(tree *tree);
 
 /* What tree_create() checks: references, shapes and numbers of the description before it is
- * reduced; that every coordinate moves mass after. MHE_E_INPUT names the part. [cold] */
+ * reduced; the joints after. MHE_E_INPUT names the part. [cold] */
 mhe_status tree_check_description(const mhe_description *description, mhe_error *err);
 mhe_status check_dependents(const mhe_description *description, mhe_error *err);
 mhe_status check_paths(const mhe_description *description, mhe_error *err);
 mhe_status tree_check_joints(const tree *tree, const mhe_description *description, mhe_error *err);
+/* 0: nothing beyond the coordinate's joints has mass; the mass matrix is singular. */
+int32_t tree_moves_mass(const tree *tree, int32_t coordinate);
 
 #ifdef __cplusplus
 }

@@ -125,17 +125,16 @@ mhe_status tree_check_joints(const tree *t, const mhe_description *d, mhe_error 
     if (t->n_q < 1) {
         return mhe_fail(err, MHE_E_INPUT, "the model has no coordinate");
     }
-    for (int32_t c = 0; c < t->n_q; c++) {
-        int moves_mass = 0;
-        for (int32_t i = 0; i < t->n_joints && !moves_mass; i++) {
-            for (int32_t up = i; up >= 0 && t->joints[i].mass > 0; up = t->joints[up].parent) {
-                moves_mass |= t->joints[up].coordinate == c;
+    return check_joint_frames(t, d, err);
+}
+
+int32_t tree_moves_mass(const tree *t, int32_t coordinate) {
+    for (int32_t i = 0; i < t->n_joints; i++) {
+        for (int32_t up = i; up >= 0 && t->joints[i].mass > 0; up = t->joints[up].parent) {
+            if (t->joints[up].coordinate == coordinate) {
+                return 1;
             }
         }
-        if (!moves_mass) {
-            return mhe_fail(err, MHE_E_INPUT, "coordinate '%s' moves no mass",
-                            d->coordinates[c].name);
-        }
     }
-    return check_joint_frames(t, d, err);
+    return 0;
 }
