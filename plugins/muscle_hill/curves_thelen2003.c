@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* curves_thelen2003.c: Thelen (2003), doi:10.1115/1.1531112, on a rigid tendon.
+/* curves_thelen2003.c: Thelen (2003), doi:10.1115/1.1531112.
  *
  * fl = exp(-(n - 1)^2 / gamma); fp = (exp(k_PE (n - 1) / e0) - 1) / (exp(k_PE) - 1) for n > 1.
  *
@@ -15,7 +15,12 @@
  *
  * Kinks: fv at u = 0 (slope of shortening taken there, 1 + 1 / A_f; lengthening has twice that) and
  * at u = -1 (slope of u > -1); fp at n = 1. Pennation at constant thickness; s is the fibre
- * velocity over vmax. */
+ * velocity over vmax.
+ *
+ * Tendon, e = x - 1: an exponential toe up to 0.33 F_max, a straight line behind it; 0 below e = 0,
+ * where its slope jumps (that of below is taken). Strain at F_max 0.04 where not stated; toe end
+ * and slope as OpenSim has them, 99 e0 exp(3) / (166 exp(3) - 67) and 0.67 / (e0 - toe end). */
+#include "elastic.h"
 #include "hill.h"
 #include "shapes.h"
 
@@ -45,6 +50,41 @@ static void thelen_curve(const struct hill_muscle *muscle, double a, double n, d
     out->f_a -= a * fl.value * fv.slope * 0.75 * u * quickness;
 }
 
+#define THELEN_TOE_FORCE 0.33
+#define THELEN_TOE_SHAPE 3
+#define THELEN_SHORTEST 0 /* where pennation sets no bound */
+
+static void thelen_lengths(const struct hill_muscle *muscle, double n, struct hill_shape *fl,
+                           struct hill_shape *fp) {
+    *fl = hill_bell(n, muscle->active_width);
+    *fp = (struct hill_shape){0, 0};
+    if (n > 1) {
+        *fp = hill_exponential(n, muscle->passive_rate, 1, muscle->passive_scale);
+    }
+}
+
+static struct hill_shape thelen_speeds(const struct hill_muscle *muscle, double a, double s,
+                                       double *by_a) {
+    double quickness = 1 / (0.25 + 0.75 * a), u = s * quickness;
+    struct hill_shape fv = thelen_velocity(muscle, u);
+    *by_a = -fv.slope * 0.75 * u * quickness;
+    return (struct hill_shape){fv.value, fv.slope * quickness};
+}
+
+static struct hill_shape thelen_tendon(const struct hill_muscle *muscle, double x) {
+    double strain = x - 1;
+    if (strain > muscle->tendon_toe) {
+        return (struct hill_shape){THELEN_TOE_FORCE +
+                                       muscle->tendon_line * (strain - muscle->tendon_toe),
+                                   muscle->tendon_line};
+    }
+    if (!(strain > 0)) {
+        return (struct hill_shape){0 * strain, 0}; /* NaN gives NaN */
+    }
+    double grown = muscle->tendon_scale * exp(muscle->tendon_rate * strain);
+    return (struct hill_shape){grown - muscle->tendon_scale, muscle->tendon_rate * grown};
+}
+
 static void thelen_prepare(const mhe_muscle *muscle, const struct hill_config *config,
                            struct hill_muscle *out) {
     double shape = hill_or(muscle->passive_shape, 5);
@@ -56,6 +96,16 @@ static void thelen_prepare(const mhe_muscle *muscle, const struct hill_config *c
     out->concentric = 1 / hill_or(muscle->velocity_shape, 0.25);
     out->eccentric_max = hill_or(muscle->max_lengthening_force, 1.4);
     out->eccentric = (2 + 2 * out->concentric) / (out->eccentric_max - 1);
+    double strain = hill_or(muscle->tendon_strain, 0.04), e3 = exp(3);
+    out->lengths = thelen_lengths;
+    out->speeds = thelen_speeds;
+    out->tendon = thelen_tendon;
+    out->tendon_zero = 1;
+    out->tendon_toe = 99 * strain * e3 / (166 * e3 - 67);
+    out->tendon_line = (1 - THELEN_TOE_FORCE) / (strain - out->tendon_toe);
+    out->tendon_rate = THELEN_TOE_SHAPE / out->tendon_toe;
+    out->tendon_scale = THELEN_TOE_FORCE / expm1(THELEN_TOE_SHAPE);
+    hill_elastic_prepare(muscle, THELEN_SHORTEST, out);
 }
 
 const struct hill_curve_set hill_thelen2003 = {

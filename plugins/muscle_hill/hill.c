@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hill.c: fibre geometry, forces and activation dynamics. */
+/* hill.c: fibre geometry, forces, activation and fibre dynamics. */
 #include "hill.h"
 
 #include "../clones.h"
+#include "elastic.h"
 #include "exponential.h"
 
 #include <math.h>
@@ -72,6 +73,41 @@ static int hill_reports(const mhe_muscle_values *out) {
            out->active != NULL || out->passive != NULL;
 }
 
+/* Adds to `out` what concerns the elastic muscle i. */
+static void hill_elastic_force(const struct hill *hill, int32_t i, const mhe_muscle_point *at,
+                               const mhe_muscle_values *out) {
+    const struct hill_muscle *m = &hill->m[i];
+    const int32_t n = hill->n, z = HILL_FIBER * n + i;
+    struct hill_elastic e;
+    hill_elastic_at(m, at->state[i], at->state[z], at->length[i], &e);
+    const struct {
+        double *to;
+        int32_t at;
+        double value;
+    } values[] = {{out->force, i, m->f_max * e.force},
+                  {out->force_s, i, 0},
+                  {out->force_s, z, m->f_max * e.force_z},
+                  {out->force_l, i, m->f_max * e.force_l},
+                  {out->force_w, i, 0},
+                  {out->rate, z, e.rate},
+                  {out->rate_e, z, 0},
+                  {out->rate_s, n + i, 0}, /* of the activation by the fibre */
+                  {out->rate_s, 2 * n + i, e.rate_a},
+                  {out->rate_s, 3 * n + i, e.rate_z},
+                  {out->rate_l, z, e.rate_l},
+                  {out->rate_w, z, 0},
+                  {out->fiber_length, i, e.n * m->l_opt},
+                  {out->fiber_velocity, i, e.rate * e.cosine * m->l_opt},
+                  {out->pennation, i, acos(e.cosine)},
+                  {out->active, i, m->f_max * e.active},
+                  {out->passive, i, m->f_max * e.passive}};
+    for (size_t k = 0; k < sizeof values / sizeof values[0]; k++) {
+        if (values[k].to != NULL) {
+            values[k].to[values[k].at] = values[k].value;
+        }
+    }
+}
+
 static void hill_force(const struct hill *hill, const mhe_muscle_point *at,
                        const mhe_muscle_values *out) {
     const double *a = at->state, *l = at->length, *w = at->velocity;
@@ -80,6 +116,10 @@ static void hill_force(const struct hill *hill, const mhe_muscle_point *at,
         const struct hill_muscle *m = &hill->m[i];
         struct hill_fibre fibre;
         struct hill_value value;
+        if (m->elastic) {
+            hill_elastic_force(hill, i, at, out);
+            continue;
+        }
         hill_fibre_at(m, l[i], w[i], &fibre);
         m->curve(m, a[i], fibre.n, fibre.s, &value);
         double along = value.f + m->damping * fibre.s;
@@ -160,23 +200,48 @@ static void hill_zero(double *values, int32_t n) {
 static mhe_status hill_evaluate(const void *self, const mhe_muscle_point *at,
                                 const mhe_muscle_values *out, mhe_error *err) {
     const struct hill *hill = self;
+    const int32_t n = hill->n, n_s = hill->n_states;
+    hill_zero(out->force_s, n_s * n);
+    hill_zero(out->rate, n_s * n);
+    hill_zero(out->rate_e, n_s * n);
+    hill_zero(out->rate_s, n_s * n_s * n);
+    hill_zero(out->rate_l, n_s * n);
+    hill_zero(out->rate_w, n_s * n);
     hill_force(hill, at, out);
-    hill_zero(out->rate_l, hill->n);
-    hill_zero(out->rate_w, hill->n);
     return out->rate == NULL && out->rate_e == NULL && out->rate_s == NULL
                ? MHE_OK
-               : hill_diagonal_rate(self, 0, at->excitation, at->state, out->rate, out->rate_e,
-                                    out->rate_s, err);
+               : hill_diagonal_rate(self, HILL_ACTIVATION, at->excitation, at->state, out->rate,
+                                    out->rate_e, out->rate_s, err);
 }
 
 static mhe_status hill_layout(const void *self, mhe_muscle_layout *out, mhe_error *err) {
-    static const char *const names[] = {"activation"}, *const units[] = {"1"};
-    static const uint8_t diagonal[] = {1};
-    (void)self, (void)err;
-    out->n_states = 1;
+    static const char *const names[] = {"activation", "fiber_length"};
+    static const char *const units[] = {"1", "1"};
+    static const uint8_t diagonal[] = {1, 0};
+    const struct hill *hill = self;
+    (void)err;
+    out->n_states = hill->n_states;
+    out->activation = HILL_ACTIVATION;
     out->names = names;
     out->units = units;
     out->diagonal = diagonal;
+    out->lower = hill->lower;
+    out->upper = hill->upper;
+    out->present = hill->present;
+    return MHE_OK;
+}
+
+static mhe_status hill_equilibrium(const void *self, const double *activation, const double *length,
+                                   const double *velocity, double *state, mhe_error *err) {
+    const struct hill *hill = self;
+    (void)err;
+    for (int32_t i = 0; i < hill->n; i++) {
+        state[i] = activation[i];
+        if (hill->m[i].elastic) {
+            state[HILL_FIBER * hill->n + i] =
+                hill_elastic_equilibrium(&hill->m[i], activation[i], length[i], velocity[i]);
+        }
+    }
     return MHE_OK;
 }
 
@@ -185,4 +250,5 @@ const mhe_muscle_ops hill_ops = {.size = sizeof hill_ops,
                                  .destroy = hill_destroy,
                                  .layout = hill_layout,
                                  .evaluate = hill_evaluate,
-                                 .diagonal_rate = hill_diagonal_rate};
+                                 .diagonal_rate = hill_diagonal_rate,
+                                 .equilibrium = hill_equilibrium};

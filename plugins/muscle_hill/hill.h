@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* hill.h: one Hill muscle with a rigid tendon, and the curve sets it can run on.
+/* hill.h: one Hill muscle, and the curve sets it can run on. Of its tendon: elastic.h.
  *
  * Symbols follow muscle-curve literature: n fibre length over optimal fibre length, s normalised
  * fibre velocity (lengthening positive; each set says by what it is divided), fl active
@@ -21,7 +21,14 @@ struct hill_config {
     double vmax;         /* optimal lengths per second; 0: the file's, else 10 */
     double passive;      /* factor of the passive force */
     double passive_ramp; /* n below a jump of the passive force over which it grows; 0: a jump */
+    int32_t tendon;      /* HILL_RIGID, HILL_ELASTIC */
 };
+
+#define HILL_RIGID 0
+#define HILL_ELASTIC 1
+
+#define HILL_ACTIVATION 0 /* the states */
+#define HILL_FIBER 1
 
 /* a fl fv + fp and its derivatives by a, n and s. */
 struct hill_value {
@@ -29,8 +36,18 @@ struct hill_value {
 };
 
 struct hill_muscle;
+struct hill_shape;
+struct hill_millard;
 typedef void (*hill_curve)(const struct hill_muscle *muscle, double a, double n, double s,
                            struct hill_value *out);
+
+/* The same curve by curve, for elastic tendons: fl and fp by n; fv by s, with its derivative by
+ * activation; the tendon's force in F_max by its length over the slack length. */
+typedef void (*hill_lengths)(const struct hill_muscle *muscle, double n, struct hill_shape *fl,
+                             struct hill_shape *fp);
+typedef struct hill_shape (*hill_speeds)(const struct hill_muscle *muscle, double a, double s,
+                                         double *by_a);
+typedef struct hill_shape (*hill_tendon)(const struct hill_muscle *muscle, double x);
 
 struct hill_muscle {
     hill_curve curve;
@@ -43,15 +60,30 @@ struct hill_muscle {
     double inv_cos; /* constant angle: 1 / cos(pennation) */
     double height;  /* constant thickness: l_opt sin(pennation), m; 0: constant angle */
     /* shapes of the passive and active curves, where a set has them to choose */
-    double passive_from;   /* n above which fp acts */
-    double passive_ramp;   /* n below it over which fp grows from 0 */
-    double passive_rate;   /* exponent per unit of n */
-    double passive_offset; /* taken off the exponential */
-    double passive_scale;  /* 1 / (exp(k_PE) - 1) or the like */
-    double active_width;   /* Thelen gamma */
-    double concentric;     /* 1 / A_f */
-    double eccentric;      /* (2 + 2 / A_f) / (F_len - 1) */
-    double eccentric_max;  /* F_len */
+    double passive_from;                /* n above which fp acts */
+    double passive_ramp;                /* n below it over which fp grows from 0 */
+    double passive_rate;                /* exponent per unit of n */
+    double passive_offset;              /* taken off the exponential */
+    double passive_scale;               /* 1 / (exp(k_PE) - 1) or the like */
+    double active_width;                /* Thelen gamma */
+    double concentric;                  /* 1 / A_f */
+    double eccentric;                   /* (2 + 2 / A_f) / (F_len - 1) */
+    double eccentric_max;               /* F_len */
+    const struct hill_millard *millard; /* that set only */
+    /* an elastic tendon, see elastic.h; lengths is NULL where the set has none */
+    hill_lengths lengths;
+    hill_speeds speeds;
+    hill_tendon tendon;
+    int32_t elastic;                              /* whether this muscle's is */
+    double l_opt;                                 /* m */
+    double vmax;                                  /* 1/s */
+    double sine;                                  /* of the pennation at optimal length */
+    double shortest;                              /* z of the shortest fibre */
+    double beta;                                  /* damping */
+    double tendon_inverse;                        /* 1 / l_slack, 1/m */
+    double tendon_zero;                           /* x up to which it is slack */
+    double tendon_rate;                           /* exponent per unit of x */
+    double tendon_scale, tendon_toe, tendon_line; /* see the sets */
 };
 
 /* A curve set. `prepare` fills everything of `out` that the curves decide, from a checked
@@ -60,23 +92,28 @@ struct hill_curve_set {
     const char *name;
     int32_t published; /* takes the overrides `damping` and `vmax` */
     int32_t jumps;     /* its passive force does, and takes `passive_ramp` */
+    int32_t millard;   /* needs hill_muscle.millard, which is there before prepare */
     void (*prepare)(const mhe_muscle *muscle, const struct hill_config *config,
                     struct hill_muscle *out);
 };
 
-extern const struct hill_curve_set hill_paper2021, hill_biorbd, hill_degroote2016, hill_thelen2003;
+extern const struct hill_curve_set hill_paper2021, hill_biorbd, hill_degroote2016, hill_thelen2003,
+    hill_millard2012;
 
 /* Order of the choices of the option `curves`. */
 extern const struct hill_curve_set *const hill_curve_sets[];
-#define HILL_CURVE_CHOICES "auto|paper2021|biorbd|degroote2016|thelen2003"
+#define HILL_CURVE_CHOICES "auto|paper2021|biorbd|degroote2016|thelen2003|millard2012"
 
 /* An instance: the muscles in the order of the model. */
 struct hill {
-    int32_t n;
-    double smoothing;      /* b of the activation dynamics */
-    double *rate_act;      /* 1 / tau_act, 1/s [n] */
-    double *rate_deact;    /* 1 / tau_deact, 1/s [n] */
-    struct hill_muscle *m; /* [n] */
+    int32_t n, n_states;          /* 2 where a tendon is elastic */
+    double smoothing;             /* b of the activation dynamics */
+    double *rate_act;             /* 1 / tau_act, 1/s [n] */
+    double *rate_deact;           /* 1 / tau_deact, 1/s [n] */
+    struct hill_muscle *m;        /* [n] */
+    struct hill_millard *millard; /* [n], those of that set filled; NULL: none is */
+    double *lower, *upper;        /* [n_states x n] */
+    uint8_t *present;             /* [n_states x n] */
 };
 
 extern const mhe_muscle_ops hill_ops;
