@@ -303,6 +303,40 @@ static void rk_activation_project(struct rk_context *c, int32_t k, int32_t n, in
     }
 }
 
+/* Where there are states z, the activations at the stages themselves: z follows them within the
+ * step, and what the last stage sees is what it ends with. The polynomial through start, stages and
+ * end of the k-th of n steps, at the mechanical stages that fall into it; start and its derivatives
+ * are in c->before. */
+static void rk_activation_sample(struct rk_context *c, int32_t k, int32_t n, int32_t derivatives) {
+    const struct rk_tableau *t = &c->rk->mechanics;
+    int32_t n_m = c->rk->system->n_m, pad = c->rk->pad;
+    double node[STAGES + 2] = {0}, *to[3], *const end[] = {c->a, c->a_a, c->a_e};
+    const double *const stage[] = {c->guess, c->guess_a, c->guess_e};
+    memcpy(node + 1, c->rk->activation.c, sizeof(double) * STAGES);
+    node[STAGES + 1] = 1;
+    for (int32_t j = 0; j < t->stages; j++) {
+        double x = t->c[j] * n - k;
+        if (!(x > 1e-12 && x <= 1 + 1e-12)) {
+            continue;
+        }
+        to[0] = c->stage_a + j * n_m;
+        to[1] = c->stage_a_a + j * n_m;
+        to[2] = c->stage_a_e + j * n_m;
+        for (int32_t i = 0; i < STAGES + 2; i++) {
+            double weight = 1;
+            for (int32_t l = 0; l < STAGES + 2; l++) {
+                weight *= l != i ? (x - node[l]) / (node[i] - node[l]) : 1;
+            }
+            for (int32_t d = 0; d < (derivatives ? 3 : 1); d++) {
+                const double *from = i == 0            ? c->before + d * pad
+                                     : i == STAGES + 1 ? end[d]
+                                                       : stage[d] + (i - 1) * pad;
+                rk_add(to[d], weight, from, n_m);
+            }
+        }
+    }
+}
+
 /* Steps that the activations need over h: as their time constants at its start say. */
 static mhe_status rk_activation_count(struct rk_context *c, const double *e, double h, int32_t *n,
                                       mhe_error *err) {
@@ -336,8 +370,16 @@ mhe_status rk_activations(struct rk_context *c, const double *e, double h, int32
     memset(c->stage_a_a, 0, bytes);
     memset(c->stage_a_e, 0, bytes);
     for (int32_t k = 0; k < n && status == MHE_OK; k++) {
+        if (c->rk->system->n_z > 0) {
+            size_t pad = (size_t)c->rk->pad;
+            memcpy(c->before, c->a, sizeof(double) * pad);
+            memcpy(c->before + pad, c->a_a, sizeof(double) * pad);
+            memcpy(c->before + 2 * pad, c->a_e, sizeof(double) * pad);
+        }
         status = rk_activation_step(c, e, k, h / n, derivatives, err);
-        if (status == MHE_OK) {
+        if (status == MHE_OK && c->rk->system->n_z > 0) {
+            rk_activation_sample(c, k, n, derivatives);
+        } else if (status == MHE_OK) {
             rk_activation_project(c, k, n, derivatives);
         }
     }

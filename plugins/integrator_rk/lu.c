@@ -92,8 +92,36 @@ CLONES static void rk_solve_rows(const double *lu, int32_t n, const int32_t *piv
     }
 }
 
+CLONES static void rk_solve_columns(const double *lu, int32_t n, const int32_t *pivots, double *x,
+                                    int32_t m) {
+    for (int32_t k = 0; k < n; k++) {
+        for (int32_t i = 0; pivots[k] != k && i < m; i++) {
+            double swap = x[k * m + i];
+            x[k * m + i] = x[pivots[k] * m + i];
+            x[pivots[k] * m + i] = swap;
+        }
+    }
+    for (int32_t k = 1; k < n; k++) {
+        for (int32_t j = 0; j < k; j++) {
+            rk_subtract(x + k * m, lu[k * n + j], x + j * m, m);
+        }
+    }
+    for (int32_t k = n - 1; k >= 0; k--) {
+        for (int32_t j = k + 1; j < n; j++) {
+            rk_subtract(x + k * m, lu[k * n + j], x + j * m, m);
+        }
+        for (int32_t i = 0; i < m; i++) {
+            x[k * m + i] *= lu[k * n + k];
+        }
+    }
+}
+
 int rk_lu_factor(double *a, int32_t n, int32_t *pivots) {
     return rk_factor_rows(a, n, pivots);
+}
+
+void rk_lu_solve_columns(const double *lu, int32_t n, const int32_t *pivots, double *x, int32_t m) {
+    rk_solve_columns(lu, n, pivots, x, m);
 }
 
 void rk_lu_solve_transposed(const double *lu, int32_t n, const int32_t *pivots, double *x,

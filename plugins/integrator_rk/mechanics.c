@@ -11,7 +11,10 @@
  * With a memory the start is the step as it was linearised last, moved to first order by what its
  * data have changed: one solve. With derivatives wanted, full Newton iterations follow (between
  * neighbouring iterates of an estimator one, seldom two), else simplified ones on the factors that
- * are there. */
+ * are there.
+ *
+ * States z of the muscles are stages beside the accelerations (states.c). They are too stiff for
+ * one Jacobian to serve several stages: each iteration that takes a new one takes all. */
 #include "rk.h"
 
 #include <math.h>
@@ -44,10 +47,17 @@ static void rk_stage(struct rk_context *c, double h, int32_t j) {
 }
 
 mhe_status rk_accelerate(const struct rk_context *c, const double *q, const double *v,
-                         const double *a, const double *r, const mhe_acceleration *out,
-                         mhe_error *err) {
+                         const double *a, const double *z, const double *r,
+                         const mhe_acceleration *out, mhe_error *err) {
     const mhe_system *system = c->rk->system;
-    const mhe_system_point at = {.size = sizeof at, .q = q, .v = v, .a = a, .r = r, .w = c->w};
+    const mhe_system_point at = {.size = sizeof at,
+                                 .q = q,
+                                 .v = v,
+                                 .a = system->n_a > 0 ? a : NULL,
+                                 .z = z,
+                                 .c = c->u,
+                                 .r = r,
+                                 .w = c->w};
     return system->acceleration(system, c->system_context, &at, out, err);
 }
 
@@ -55,7 +65,7 @@ mhe_status rk_accelerate(const struct rk_context *c, const double *q, const doub
 static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, int32_t j,
                               int32_t derivatives, mhe_error *err) {
     const mhe_system *system = c->rk->system;
-    int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r;
+    int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_z = system->n_z;
     mhe_acceleration out = {.size = sizeof out, .vdot = c->f + j * n_q};
     if (derivatives) {
         out.vdot_q = c->at->f_q + j * n_q * n_q;
@@ -64,7 +74,21 @@ static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, i
         out.vdot_r = n_r > 0 ? c->at->f_r + j * n_q * n_r : NULL;
     }
     rk_stage(c, h, j);
-    return rk_accelerate(c, c->stage_q, c->stage_v, c->stage_a + j * n_m, r, &out, err);
+    if (n_z == 0) {
+        return rk_accelerate(c, c->stage_q, c->stage_v, c->stage_a + j * n_m, NULL, r, &out, err);
+    }
+    out.zdot = c->H + j * n_z;
+    if (derivatives) {
+        out.vdot_a = system->n_a > 0 ? out.vdot_a : NULL;
+        out.vdot_z = c->at->f_z + j * n_q * n_z;
+        out.zdot_q = c->at->h_q + j * n_z * n_q;
+        out.zdot_v = c->at->h_v + j * n_z * n_q;
+        out.zdot_a = system->n_a > 0 ? c->at->h_a + j * n_z : NULL;
+        out.zdot_c = c->at->h_c + j * n_z;
+        out.zdot_z = c->at->h_z + j * n_z * system->n_k;
+    }
+    return rk_accelerate(c, c->stage_q, c->stage_v, c->stage_a + j * n_m, c->Z + j * n_z, r, &out,
+                         err);
 }
 
 /* Where an iteration takes its Jacobian from. */
@@ -101,31 +125,34 @@ static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_er
             }
         }
     }
-    return rk_lu_factor(c->at->lu, n, c->at->pivots)
+    return (c->rk->system->n_z == 0 || rk_states_factor(c, h)) &&
+                   rk_lu_factor(c->at->lu, n, c->at->pivots)
                ? MHE_OK
                : mhe_fail(err, MHE_RETRY, "a stage system over %g s has no solution", h);
 }
 
-/* Adds the solution of J x = residual to K. Returns its size as a velocity, in units of 1 + |v|;
- * NaN where it has none. */
+/* Adds the solution of J x = residual to K (and moves Z, behind rk_states_before). Returns its size
+ * as a velocity, in units of 1 + |v|; NaN where it has none. */
 static double rk_correct(struct rk_context *c, double h) {
     int32_t n_q = c->rk->system->n_q, n = c->rk->mechanics.stages * n_q;
+    int32_t n_z = c->rk->system->n_z;
     rk_lu_solve(c->at->lu, n, c->at->pivots, c->residual);
-    double largest = 0, speed = 0, sum = 0;
+    double largest = 0, speed = 0, sum = 0, states = n_z > 0 ? rk_states_after(c) : 0;
     for (int32_t i = 0; i < n; i++) {
         double size = fabs(c->residual[i]);
         largest = size > largest ? size : largest;
         sum += size; /* not finite if one is not */
         c->K[i] += c->residual[i];
     }
-    if (!isfinite(sum)) {
+    if (!isfinite(sum + states)) {
         return NAN;
     }
     for (int32_t i = 0; i < n_q; i++) {
         double size = fabs(c->v[i]);
         speed = size > speed ? size : speed;
     }
-    return h * largest / (1 + speed);
+    double change = h * largest / (1 + speed);
+    return states > change ? states : change;
 }
 
 /* Stage accelerations of the system linearised at the start of the step, from one evaluation there;
@@ -139,7 +166,7 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
                                   .vdot_q = c->at->f_q,
                                   .vdot_v = c->at->f_v,
                                   .vdot_a = c->at->f_a};
-    mhe_status status = rk_accelerate(c, c->q, c->v, c->a_start, r, &out, err);
+    mhe_status status = rk_accelerate(c, c->q, c->v, c->a_start, NULL, r, &out, err);
     if (status == MHE_OK) {
         rk_keep_start(c);
         status = rk_factor(c, h, 0, err);
@@ -167,6 +194,18 @@ static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mh
     }
     (void)rk_correct(c, h);
     return MHE_OK;
+}
+
+/* With states z: the acceleration at the start for all stages, and z itself. */
+static mhe_status rk_predict_states(struct rk_context *c, const double *r, mhe_error *err) {
+    int32_t n_q = c->rk->system->n_q, n_z = c->rk->system->n_z;
+    const mhe_acceleration out = {.size = sizeof out, .vdot = c->f, .zdot = c->H};
+    mhe_status status = rk_accelerate(c, c->q, c->v, c->a_start, c->z, r, &out, err);
+    for (int32_t j = 0; j < c->rk->mechanics.stages && status == MHE_OK; j++) {
+        memcpy(c->K + j * n_q, c->f, sizeof(double) * (size_t)n_q);
+        memcpy(c->Z + j * n_z, c->z, sizeof(double) * (size_t)n_z);
+    }
+    return status;
 }
 
 /* Stage accelerations from those of the last step of this length that was linearised here: to first
@@ -198,6 +237,9 @@ static int rk_recall(struct rk_context *c, const double *r, double h) {
         c->residual[k] = sum;
     }
     c->at = &c->kept;
+    if (system->n_z > 0) {
+        rk_states_recall(c, h);
+    }
     memcpy(c->K, at->K, sizeof(double) * (size_t)n);
     return isfinite(rk_correct(c, h));
 }
@@ -214,6 +256,9 @@ static void rk_keep(const struct rk_context *c, const double *r, double h) {
     }
     memcpy(at->stage_a, c->stage_a, sizeof(double) * (size_t)(s * system->n_m));
     memcpy(at->K, c->K, sizeof(double) * (size_t)(s * n_q));
+    if (system->n_z > 0) {
+        rk_states_keep(c);
+    }
     *at->step = h;
 }
 
@@ -222,6 +267,10 @@ static void rk_keep(const struct rk_context *c, const double *r, double h) {
 static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, int jacobian,
                              double *change, mhe_error *err) {
     int32_t s = c->rk->mechanics.stages, n = s * c->rk->system->n_q;
+    int32_t states = c->rk->system->n_z > 0;
+    if (states && jacobian == RK_JACOBIAN_MIDDLE) {
+        jacobian = RK_JACOBIAN_ALL;
+    }
     if (jacobian != RK_JACOBIAN_KEPT && !c->keeps) {
         c->at = &c->own;
     }
@@ -234,6 +283,10 @@ static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, in
     }
     for (int32_t i = 0; i < n; i++) {
         c->residual[i] = c->f[i] - c->K[i];
+    }
+    if (states) {
+        rk_states_offset(c, h);
+        rk_states_before(c);
     }
     *change = rk_correct(c, h);
     return isfinite(*change) ? MHE_OK
@@ -286,7 +339,8 @@ static mhe_status rk_implicit(struct rk_context *c, const double *r, double h, i
         }
     }
     c->at = c->keeps ? &c->kept : &c->own;
-    mhe_status status = rk_predict(c, r, h, err);
+    mhe_status status =
+        c->rk->system->n_z > 0 ? rk_predict_states(c, r, err) : rk_predict(c, r, h, err);
     if (status == MHE_OK) { /* the middle stage is nearer to all than the start is */
         status = rk_newton(c, r, h, RK_JACOBIAN_MIDDLE,
                            derivatives ? fmax(tolerance, RK_BEFORE_LAST) : tolerance, err);
@@ -336,7 +390,9 @@ mhe_status rk_mechanics(struct rk_context *c, const double *r, double h, int32_t
 mhe_status rk_advance(struct rk_context *c, double h, int32_t derivatives, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q;
-    if (derivatives) {
+    if (derivatives && c->rk->system->n_z > 0) {
+        rk_states_chain(c, h);
+    } else if (derivatives) {
         rk_chain(c, h);
     }
     for (int32_t i = 0; i < n_q; i++) {
@@ -350,6 +406,9 @@ mhe_status rk_advance(struct rk_context *c, double h, int32_t derivatives, mhe_e
         if (!isfinite(c->q[i]) || !isfinite(c->v[i])) {
             return mhe_fail(err, MHE_RETRY, "a step of %g s left the finite", h);
         }
+    }
+    if (c->rk->system->n_z > 0 && !rk_states_advance(c)) {
+        return mhe_fail(err, MHE_RETRY, "a step of %g s left the finite", h);
     }
     c->step++;
     return MHE_OK;

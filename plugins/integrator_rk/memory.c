@@ -23,7 +23,11 @@ static double *rk_take(double **next, int32_t n) {
 int32_t rk_slot_size(const struct rk *rk) {
     int32_t q = rk->system->n_q, m = rk->system->n_m, r = rk->system->n_r;
     int32_t s = rk->mechanics.stages, n = s * q;
-    return 1 + 2 * q + r + s * m + n + 2 * n * q + n * m + n * r + n * n + n;
+    int32_t size = 1 + 2 * q + r + s * m + n + 2 * n * q + n * m + n * r + n * n + n;
+    int32_t z = rk->system->n_z, k = rk->system->n_k;
+    return z == 0 ? size
+                  : size + z + m + s * z + n * z + s * z * (2 * q + 2 + k) + m * s * k * s * k +
+                        s * z * n;
 }
 
 void rk_slot_at(const struct rk *rk, double *memory, struct rk_slot *out) {
@@ -41,6 +45,21 @@ void rk_slot_at(const struct rk *rk, double *memory, struct rk_slot *out) {
     out->f_r = rk_take(&memory, n * r);
     out->lu = rk_take(&memory, n * n);
     out->pivots = (int32_t *)(void *)rk_take(&memory, n);
+    int32_t z = rk->system->n_z, k = rk->system->n_k;
+    if (z == 0) {
+        return;
+    }
+    out->z = rk_take(&memory, z);
+    out->u = rk_take(&memory, m);
+    out->Z = rk_take(&memory, s * z);
+    out->f_z = rk_take(&memory, n * z);
+    out->h_q = rk_take(&memory, s * z * q);
+    out->h_v = rk_take(&memory, s * z * q);
+    out->h_a = rk_take(&memory, s * z);
+    out->h_c = rk_take(&memory, s * z);
+    out->h_z = rk_take(&memory, s * z * k);
+    out->P = rk_take(&memory, m * s * k * s * k);
+    out->E = rk_take(&memory, s * z * n);
 }
 
 int32_t rk_trace_size(const struct rk *rk) {

@@ -137,12 +137,12 @@ static mhe_status rk_probe(struct rk_context *c, const double *r, double h,
         c->stage_v[i] = c->v[i] + h * dv;
         c->stage_q[i] = c->q[i] + h * (probe->t * c->v[i] + h * dq);
     }
-    return rk_accelerate(c, c->stage_q, c->stage_v, c->probe_a, r, &want, err);
+    return rk_accelerate(c, c->stage_q, c->stage_v, c->probe_a, NULL, r, &want, err);
 }
 
-/* Whether steps are tested at all. */
+/* Whether steps are tested at all: the tests are those of Gauss schemes. */
 static int rk_judged(const struct rk *rk) {
-    return rk->config.tolerance > 0 && !rk->mechanics.is_explicit;
+    return rk->config.tolerance > 0 && rk->config.scheme == RK_GAUSS;
 }
 
 void rk_keep_start(struct rk_context *c) {

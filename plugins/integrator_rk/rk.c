@@ -6,17 +6,38 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define RK_SHORTEST 1e-6 /* max_step, s */
+
 static mhe_status rk_accepts(const mhe_system *system, const void *config, mhe_error *err) {
-    (void)config;
-    if (system->n_z > 0) {
+    int32_t scheme = ((const struct rk_config *)config)->scheme;
+    if (system->n_z > 0 && scheme != RK_AUTO && scheme != RK_RADAU) {
         return mhe_fail(err, MHE_E_UNSUPPORTED,
-                        "muscles with states beside their activation are beyond its schemes");
+                        "scheme: %s; muscles with states beside their activation (elastic tendons) "
+                        "need radau, which forgets a wrong start",
+                        scheme == RK_GAUSS ? "gauss" : "rk4");
+    }
+    if (system->n_k > RK_MAX_STATES) {
+        return mhe_fail(err, MHE_E_UNSUPPORTED, "a muscle with %d states; at most %d are possible",
+                        system->n_k, RK_MAX_STATES);
     }
     return system->n_p > 0 ? mhe_fail(err, MHE_E_UNSUPPORTED, "it knows no parameters") : MHE_OK;
 }
 
 static void rk_destroy(void *self) {
     free(self);
+}
+
+/* What is left to the scheme. */
+static void rk_defaults(const mhe_system *system, struct rk_config *config) {
+    if (config->scheme == RK_AUTO) {
+        config->scheme = system->n_z > 0 ? RK_RADAU : RK_GAUSS;
+    }
+    if (config->stages == 0) {
+        config->stages = config->scheme == RK_RADAU ? 3 : 4;
+    }
+    if (config->max_step == 0) {
+        config->max_step = config->scheme == RK_RADAU ? 0.0025 : 0.015;
+    }
 }
 
 static mhe_status rk_create(const mhe_host *host, const mhe_system *system, const void *config,
@@ -28,10 +49,18 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
     }
     rk->system = system;
     rk->config = *(const struct rk_config *)config;
+    if (rk->config.max_step > 0 && rk->config.max_step < RK_SHORTEST) {
+        free(rk);
+        return mhe_fail(err, MHE_E_CONFIG, "max_step: below %g s; 0 leaves it to the scheme",
+                        RK_SHORTEST);
+    }
+    rk_defaults(system, &rk->config);
     rk->pad = (system->n_m + RK_LANES - 1) / RK_LANES * RK_LANES;
     rk_tableau_gauss(RK_ACTIVATION_STAGES, &rk->activation);
     if (rk->config.scheme == RK_RK4) {
         rk_tableau_rk4(&rk->mechanics);
+    } else if (rk->config.scheme == RK_RADAU) {
+        rk_tableau_radau(rk->config.stages, &rk->mechanics);
     } else {
         rk_tableau_gauss(rk->config.stages, &rk->mechanics);
         rk_tableau_probes(&rk->mechanics, rk->probes);
@@ -61,7 +90,8 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
     const mhe_system *system = rk->system;
     size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, pad = (size_t)rk->pad;
     size_t s = (size_t)rk->mechanics.stages;
-    size_t columns = 2 * n_q + (size_t)(system->n_d + system->n_u);
+    size_t columns = (size_t)(system->n_x + system->n_u), n_z = (size_t)system->n_z;
+    size_t wide = n_z > 0 ? columns : 0;
     double *slot, *trace;
     struct rk_context *c = calloc(1, sizeof *c);
     if (c == NULL) {
@@ -99,8 +129,18 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                   {&c->row, n_m},
                   {&c->adjoint, 2 * n_q * s * n_q},
                   {&c->carry, 2 * n_q * 2 * n_q},
-                  {&c->sens, 2 * n_q * columns},
-                  {&c->sens_next, 2 * n_q * columns}};
+                  {&c->sens, (2 * n_q + n_z) * columns},
+                  {&c->sens_next, 2 * n_q * (columns - wide)},
+                  {&c->z, n_z},
+                  {&c->Z, s * n_z},
+                  {&c->H, s * n_z},
+                  {&c->offset, s * n_z},
+                  {&c->dz, s * n_z},
+                  {&c->by_K, s * n_z * s * n_q},
+                  {&c->wide_K, s * n_q * wide},
+                  {&c->wide_H, s * n_z * wide},
+                  {&c->wide_Z, s * n_z * wide},
+                  {&c->before, n_z > 0 ? 3 * pad : 0}};
     const size_t n_arrays = sizeof arrays / sizeof arrays[0];
     size_t total = 1;
     for (size_t i = 0; i < n_arrays; i++) {
@@ -150,6 +190,7 @@ static void rk_begin(struct rk_context *c, const double *x, const double *u) {
         }
         rk_fill(c->stage_a_e, s * n_m, 1);
     }
+    memcpy(c->z, x + 2 * n_q + system->n_d, sizeof(double) * (size_t)system->n_z);
     c->step = 0;
 }
 
@@ -168,6 +209,11 @@ static void rk_derivatives(const struct rk_context *c, double *A, double *B) {
         A[(2 * n_q + i) * n_x + 2 * n_q + i] = c->a_a[i];
         B[(2 * n_q + i) * n_u + i] = c->a_e[i];
     }
+    for (int32_t i = 0; i < system->n_z; i++) {
+        const double *row = c->sens + (2 * n_q + i) * c->columns;
+        memcpy(A + (2 * n_q + n_d + i) * n_x, row, sizeof(double) * (size_t)n_x);
+        memcpy(B + (2 * n_q + n_d + i) * n_u, row + n_x, sizeof(double) * (size_t)n_u);
+    }
 }
 
 static mhe_status rk_step(void *context, const double *x, const double *u, const double *w,
@@ -176,6 +222,7 @@ static mhe_status rk_step(void *context, const double *x, const double *u, const
     struct rk_context *c = context;
     const int32_t derivatives = out != NULL && out->A != NULL;
     c->memory = memory;
+    c->u = u;
     c->w = w;
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q;
@@ -188,6 +235,7 @@ static mhe_status rk_step(void *context, const double *x, const double *u, const
     memcpy(x_next, c->q, sizeof(double) * (size_t)n_q);
     memcpy(x_next + n_q, c->v, sizeof(double) * (size_t)n_q);
     memcpy(x_next + 2 * n_q, c->a, sizeof(double) * (size_t)system->n_d);
+    memcpy(x_next + 2 * n_q + system->n_d, c->z, sizeof(double) * (size_t)system->n_z);
     if (derivatives) {
         rk_derivatives(c, out->A, out->B);
     }

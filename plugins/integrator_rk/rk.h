@@ -19,13 +19,16 @@
 #define RK_WEIGHED 4 /* activation steps in a mechanical one, whose weights are known ahead */
 #define RK_PROBES 5
 #define RK_TESTS 4
-#define RK_GAUSS 0
-#define RK_RK4 1
+#define RK_MAX_STATES 8 /* of a muscle in z */
+#define RK_AUTO 0
+#define RK_GAUSS 1
+#define RK_RADAU 2
+#define RK_RK4 3
 
 /* Filled by the core from the option table in plugin.c. */
 struct rk_config {
-    int32_t scheme; /* RK_GAUSS, RK_RK4 */
-    int32_t stages; /* Gauss only */
+    int32_t scheme; /* RK_GAUSS ...; in an instance never RK_AUTO */
+    int32_t stages; /* Gauss and Radau; 0, and in max_step: the scheme's own */
     double max_step;
     double newton_tolerance;
     int32_t max_newton;
@@ -45,6 +48,7 @@ struct rk_tableau {
 };
 
 void rk_tableau_gauss(int32_t stages, struct rk_tableau *out); /* 1..RK_MAX_STAGES */
+void rk_tableau_radau(int32_t stages, struct rk_tableau *out);
 void rk_tableau_rk4(struct rk_tableau *out);
 
 /* A time between the stages. On a step of length h the collocation polynomial has there the
@@ -82,6 +86,13 @@ struct rk_slot {
     double *f_q, *f_v, *f_a, *f_r; /* [s x ...] derivatives at the stages */
     double *lu;                    /* [s n_q x s n_q] LU of the stage equations */
     int32_t *pivots;               /* [s n_q] */
+    /* where there are states z (states.c) */
+    double *z, *u;                       /* [n_z], [n_m] data */
+    double *Z;                           /* [s x n_z] the stages it found */
+    double *f_z;                         /* [s x n_q x n_z] */
+    double *h_q, *h_v, *h_a, *h_c, *h_z; /* [s x n_z x n_q] .. [s x n_z], [s x n_z x n_k] */
+    double *P;                           /* [n_m x (s n_k)^2] */
+    double *E;                           /* [s n_z x s n_q] */
 };
 
 /* The same of a step of the activations. */
@@ -96,11 +107,11 @@ struct rk_trace {
 struct rk_context {
     const struct rk *rk;
     void *system_context;
-    double *arrays;  /* all arrays below */
-    double *memory;  /* the interval's, NULL: none */
-    const double *w; /* inputs of the interval */
-    int32_t step;    /* mechanical steps done in the interval */
-    int32_t slot;    /* of the present one in the memory; memory_steps: none */
+    double *arrays;      /* all arrays below */
+    double *memory;      /* the interval's, NULL: none */
+    const double *u, *w; /* controls and inputs of the interval */
+    int32_t step;        /* mechanical steps done in the interval */
+    int32_t slot;        /* of the present one in the memory; memory_steps: none */
 
     /* activations */
     double *a, *a_a, *a_e;             /* [pad] value now; its derivatives by start and control */
@@ -128,8 +139,16 @@ struct rk_context {
     double *adjoint;           /* [s n_q x 2 n_q] d(q+, v+)/d(right-hand sides), transposed */
     double *carry;             /* [2 n_q x 2 n_q] d(q+, v+)/d(q, v), transposed */
     double *row;               /* [n_m] */
-    double *sens, *sens_next;  /* [2 n_q x columns] */
-    int32_t columns;           /* 2 n_q + n_d + n_m + n_r */
+    double *sens, *sens_next;  /* [2 n_q + n_z x columns]; the first alone where there is z */
+    int32_t columns;           /* n_x + n_u */
+
+    /* states z (states.c) */
+    double *z;                        /* [n_z] now */
+    double *Z, *H;                    /* [s x n_z] stage values, rates */
+    double *offset, *dz;              /* [s x n_z] */
+    double *by_K;                     /* [s n_z x s n_q] */
+    double *wide_K, *wide_H, *wide_Z; /* [s n_q x columns], [s n_z x columns] twice */
+    double *before;                   /* [3 x pad] a, a_a, a_e before a step of the activations */
 };
 
 /* Stage activations and their derivatives for the mechanical step [0, h]; moves a, a_a, a_e to its
@@ -158,8 +177,8 @@ void rk_tests(const struct rk_tableau *t, const struct rk_probe *probes, struct 
 
 /* The system's accelerations at a point with the inputs of the interval. [hot] */
 mhe_status rk_accelerate(const struct rk_context *c, const double *q, const double *v,
-                         const double *a, const double *r, const mhe_acceleration *out,
-                         mhe_error *err);
+                         const double *a, const double *z, const double *r,
+                         const mhe_acceleration *out, mhe_error *err);
 
 /* Right after the evaluation at the start of a step (f, f_a of stage 0): keeps f at the first
  * probe. [hot] */
@@ -179,10 +198,25 @@ void rk_trace_at(const struct rk *rk, double *memory, struct rk_trace *out);
 int rk_memory_slot(const struct rk_context *c, struct rk_slot *out);
 int rk_memory_trace(const struct rk_context *c, int32_t k, struct rk_trace *out);
 
+/* states.c. rk_states_factor: behind the derivatives at the stages and the equations without z in
+ * `lu`: P and E, and what z adds to `lu`; 0: singular. rk_states_offset: what Z is off by.
+ * rk_states_before and _after: around the solution for K, residual to dK; the latter moves Z and
+ * returns the size of that. rk_states_recall: Z of the slot in use, and before() what moves it from
+ * there. [hot] */
+int rk_states_factor(struct rk_context *c, double h);
+void rk_states_offset(struct rk_context *c, double h);
+void rk_states_before(struct rk_context *c);
+double rk_states_after(struct rk_context *c);
+void rk_states_recall(struct rk_context *c, double h);
+void rk_states_keep(const struct rk_context *c);
+void rk_states_chain(struct rk_context *c, double h);
+int rk_states_advance(struct rk_context *c);
+
 /* lu.c: a [n x n] row-major becomes its LU factors (0: singular); x [n] = A^-1 x; x [n x m],
- * row-major, = A^-T x. */
+ * row-major, = A^-1 x, = A^-T x. */
 int rk_lu_factor(double *a, int32_t n, int32_t *pivots);
 void rk_lu_solve(const double *lu, int32_t n, const int32_t *pivots, double *x);
+void rk_lu_solve_columns(const double *lu, int32_t n, const int32_t *pivots, double *x, int32_t m);
 void rk_lu_solve_transposed(const double *lu, int32_t n, const int32_t *pivots, double *x,
                             int32_t m);
 

@@ -3,6 +3,7 @@
 #include "rk.h"
 
 #include <math.h>
+#include <string.h>
 
 #define RK_PI 3.14159265358979323846
 
@@ -65,6 +66,51 @@ void rk_tableau_gauss(int32_t stages, struct rk_tableau *out) {
             out->A[j * stages + k] = out->c[j] * integral;
         }
     }
+    rk_tableau_finish(out);
+}
+
+/* P_n(z), the Legendre polynomial. */
+static double rk_legendre_at(int32_t n, double z) {
+    double p = 1, previous = 0;
+    for (int32_t d = 1; d <= n; d++) {
+        double next = ((2 * d - 1) * z * p - (d - 1) * previous) / d;
+        previous = p;
+        p = next;
+    }
+    return p;
+}
+
+/* Radau IIA: nodes are the roots of P_(s-1) - P_s on [-1, 1], of which 1 is the last; collocation
+ * (Hairer and Wanner, chapter IV.5). */
+void rk_tableau_radau(int32_t stages, struct rk_tableau *out) {
+    double rule_c[RK_MAX_STAGES], rule_b[RK_MAX_STAGES];
+    const int32_t n = 512; /* far below the distance of two roots */
+    int32_t found = 0;
+    *out = (struct rk_tableau){.stages = stages, .terms = stages};
+    for (int32_t i = 0; i < n && found < stages - 1; i++) {
+        double lower = -1 + 2.0 * i / n, upper = -1 + 2.0 * (i + 1) / n;
+        double sign = rk_legendre_at(stages - 1, lower) - rk_legendre_at(stages, lower);
+        if (sign * (rk_legendre_at(stages - 1, upper) - rk_legendre_at(stages, upper)) > 0) {
+            continue;
+        }
+        for (int32_t k = 0; k < 60; k++) {
+            double z = 0.5 * (lower + upper);
+            double off = rk_legendre_at(stages - 1, z) - rk_legendre_at(stages, z);
+            *(off * sign > 0 ? &lower : &upper) = z;
+        }
+        out->c[found++] = 0.5 + 0.25 * (lower + upper);
+    }
+    out->c[stages - 1] = 1;
+    rk_gauss_rule(stages, rule_c, rule_b);
+    for (int32_t j = 0; j < stages; j++) {
+        for (int32_t k = 0; k < stages; k++) {
+            for (int32_t m = 0; m < stages; m++) {
+                out->A[j * stages + k] +=
+                    out->c[j] * rule_b[m] * rk_lagrange(out->c, stages, k, out->c[j] * rule_c[m]);
+            }
+        }
+    }
+    memcpy(out->b, out->A + (stages - 1) * stages, sizeof(double) * (size_t)stages);
     rk_tableau_finish(out);
 }
 
