@@ -152,7 +152,10 @@ mhe_status skeleton_create(const tree *source, int32_t with_mass, skeleton **out
         build(*made, with_mass != 0);
     });
     if (status != MHE_OK) {
-        skeleton_free(made);
+        if (status !=
+            MHE_E_MEMORY) { /* half made, Simbody's parts cannot be taken apart: they stay */
+            skeleton_free(made);
+        }
         return status;
     }
     *out = made;

@@ -13,11 +13,13 @@ struct mhi_arena_block {
 
 void *mhi_arena_take(mhi_arena *arena, size_t bytes) {
     if (bytes > SIZE_MAX / 2) {
+        arena->failed = 1;
         return NULL;
     }
     size_t total = sizeof(struct mhi_arena_block) + (bytes + 63) / 64 * 64;
     struct mhi_arena_block *block = aligned_alloc(64, total);
     if (block == NULL) {
+        arena->failed = 1;
         return NULL;
     }
     memset(block, 0, total);

@@ -7,6 +7,7 @@
 
 typedef struct mhi_arena {
     struct mhi_arena_block *blocks; /* {0} is an empty arena */
+    int32_t failed;                 /* something was not given: what was made of it is not whole */
 } mhi_arena;
 
 /* Zeroed, 64-byte aligned memory that lives until mhi_arena_free; NULL when memory is out. n = 0

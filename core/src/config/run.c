@@ -326,6 +326,9 @@ static mhe_status read_run(const mhi_run_text *text, const char *path, const cha
         status = status == MHE_OK ? read_plugin_sections(&reader, NULL) : status;
         status = status == MHE_OK ? check_run(&reader) : status;
     }
+    if (run->arena.failed) { /* whatever else was found wrong may have come of it */
+        status = no_memory(&reader);
+    }
     if (status != MHE_OK) {
         mhi_run_free(run);
         return status;

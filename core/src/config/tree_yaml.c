@@ -185,10 +185,10 @@ static int tab_indents_line(const char *text, size_t length, size_t line) {
 
 static mhe_status parser_error(const struct loader *loader, const yaml_parser_t *parser,
                                const char *text, size_t length) {
-    if (parser->error == YAML_MEMORY_ERROR) {
-        return no_memory(loader);
+    if (parser->error == YAML_MEMORY_ERROR || parser->problem == NULL) {
+        return no_memory(loader); /* the one error that libyaml does not always name */
     }
-    const char *problem = parser->problem == NULL ? "syntax error" : parser->problem;
+    const char *problem = parser->problem;
     size_t line = parser->problem_mark.line + 1;
     if (parser->error == YAML_READER_ERROR) { /* knows the byte, not the line */
         line = 1;

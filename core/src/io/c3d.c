@@ -106,21 +106,24 @@ static double sample(const mhi_c3d_file *file, const layout *l, const uint8_t *a
     return l->is_float ? mhi_c3d_float(file, at) : mhi_c3d_int16(file, at);
 }
 
-static void take_unit(const mhi_c3d_file *file, mhi_table *t) {
+static mhe_status take_unit(const mhi_c3d_file *file, mhi_table *t) {
     const mhi_c3d_parameter p = mhi_c3d_find(file, "POINT", "UNITS");
     char *text = mhi_c3d_text(&p, 0);
-    const char *said = text == NULL ? "" : text;
-    mhi_length_unit unit = mhi_length_unit_of((mhi_cell){said, strlen(said)});
+    if (text == NULL) {
+        return no_memory(file);
+    }
+    mhi_length_unit unit = mhi_length_unit_of((mhi_cell){text, strlen(text)});
     if (unit.metres == 0) {
         char line[128];
         (void)snprintf(line, sizeof line, "POINT:UNITS is '%.20s', none of mm, cm, m; mm is taken",
-                       said);
+                       text);
         warn(t, line);
         unit = (mhi_length_unit){"mm", 1e-3};
     }
     t->unit = unit.metres;
     memcpy(t->unit_name, unit.name, sizeof t->unit_name);
     free(text);
+    return MHE_OK;
 }
 
 static mhe_status read_points(const mhi_c3d_file *file, const layout *l, mhi_table **out) {
@@ -132,7 +135,10 @@ static mhe_status read_points(const mhi_c3d_file *file, const layout *l, mhi_tab
         return status;
     }
     mhi_table *t = *out;
-    take_unit(file, t);
+    status = take_unit(file, t);
+    if (status != MHE_OK) {
+        return status;
+    }
     const double factor = (l->is_float ? 1 : l->scale) * t->unit;
     double *value = t->values;
     for (int32_t k = 0; k < l->n_frames; k++) {
@@ -179,7 +185,11 @@ static mhe_status read_analog(const mhi_c3d_file *file, const layout *l, mhi_tab
     if (status == MHE_OK) {
         const mhi_c3d_parameter p = mhi_c3d_find(file, "ANALOG", "FORMAT");
         char *format = mhi_c3d_text(&p, 0);
-        const int unsigned_ = format != NULL && strcmp(format, "UNSIGNED") == 0;
+        if (format == NULL) {
+            free(scale);
+            return no_memory(file);
+        }
+        const int unsigned_ = strcmp(format, "UNSIGNED") == 0;
         free(format);
         const double general = mhi_c3d_find_number(file, "ANALOG", "GEN_SCALE", 1);
         of_channels(file, "SCALE", 0, 1, scale, l->n_channels);

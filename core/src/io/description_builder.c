@@ -17,6 +17,9 @@ void mhi_build_start(mhi_builder *b, const char *source, mhe_error *err) {
 }
 
 mhe_status mhi_build_abandon(mhi_builder *b) {
+    if (b->arena.failed) { /* whatever else was found wrong came of it */
+        b->status = mhe_fail(b->err, MHE_E_MEMORY, "%s: out of memory", b->source);
+    }
     mhi_arena_free(&b->arena);
     return b->status;
 }

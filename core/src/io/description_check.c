@@ -399,13 +399,14 @@ mhe_status mhi_build_finish(mhi_builder *b, mhe_description **description) {
     if (b->status == MHE_OK) {
         place_points(b, d, place, mirrored);
     }
-    if (b->status != MHE_OK) {
+    mhi_build_count_kinds(b);
+    const char *name = b->name != NULL ? b->name : base_name(b);
+    if (b->status != MHE_OK || b->arena.failed) {
         free(owned);
         return mhi_build_abandon(b);
     }
-    mhi_build_count_kinds(b);
     d->size = sizeof *d;
-    d->name = b->name != NULL ? b->name : base_name(b);
+    d->name = name;
     d->source = b->source;
     memcpy(d->gravity, b->gravity, sizeof d->gravity);
     d->unsupported = (const char *const *)b->unsupported.items;

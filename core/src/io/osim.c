@@ -132,17 +132,43 @@ static void quiet(void *data, xmlError *problem) {
     (void)data, (void)problem; /* told by fail_syntax() */
 }
 
-/* Parses without network and without a word: complaints about the encoding come from below the
- * context and would go to stderr, so this thread's handler is set aside. */
+/* Parses without network. */
 static xmlDoc *parse(xmlParserCtxt *context, const char *text, int length) {
-    const xmlStructuredErrorFunc handler = xmlStructuredError;
-    void *handler_data = xmlStructuredErrorContext;
-    xmlSetStructuredErrorFunc(NULL, quiet);
-    xmlDoc *document = xmlCtxtReadMemory(context, text, length, NULL, NULL,
-                                         XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING |
-                                             XML_PARSE_BIG_LINES);
-    xmlSetStructuredErrorFunc(handler_data, handler);
-    return document;
+    return xmlCtxtReadMemory(context, text, length, NULL, NULL,
+                             XML_PARSE_NONET | XML_PARSE_NOERROR | XML_PARSE_NOWARNING |
+                                 XML_PARSE_BIG_LINES);
+}
+
+/* libxml2 does not always say so where it had no memory: a document that it gives may end early, an
+ * error may name what the lack of memory made of the file. `document` NULL: the file is wrong where
+ * it is so twice in the same way. */
+static int32_t lacked_memory(xmlParserCtxt *context, const xmlDoc *document, const char *text,
+                             int length) {
+    if (document != NULL) {
+        return context->errNo == XML_ERR_NO_MEMORY || context->disableSAX != 0;
+    }
+    xmlParserCtxt *again = xmlNewParserCtxt();
+    xmlDoc *second = again == NULL ? NULL : parse(again, text, length);
+    const int32_t same = again != NULL && second == NULL && again->errNo == context->errNo &&
+                         context->errNo != XML_ERR_NO_MEMORY &&
+                         again->lastError.line == context->lastError.line;
+    xmlFreeDoc(second);
+    xmlFreeParserCtxt(again);
+    return !same;
+}
+
+static void read_text(mhi_osim *o, const char *text, int length) {
+    xmlParserCtxt *context = xmlNewParserCtxt();
+    xmlDoc *document = context == NULL ? NULL : parse(context, text, length);
+    if (context == NULL || lacked_memory(context, document, text, length)) {
+        o->b.status = mhe_fail(o->b.err, MHE_E_MEMORY, "%s: out of memory", o->b.source);
+    } else if (document == NULL) {
+        fail_syntax(o, context);
+    } else {
+        read_document(o, document);
+    }
+    xmlFreeDoc(document);
+    xmlFreeParserCtxt(context);
 }
 
 mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
@@ -155,20 +181,13 @@ mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
         mhi_build_fail(&o.b, 0, "the file is too large");
         return mhi_build_abandon(&o.b);
     }
-    xmlParserCtxt *context = xmlNewParserCtxt();
-    if (context == NULL) {
-        o.b.status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        return mhi_build_abandon(&o.b);
-    }
+    /* Not a word from below: complaints about memory and the encoding would go to stderr. */
+    const xmlStructuredErrorFunc handler = xmlStructuredError;
+    void *handler_data = xmlStructuredErrorContext;
+    xmlSetStructuredErrorFunc(NULL, quiet);
     mhi_c_locale saved = mhi_c_locale_begin();
-    xmlDoc *document = parse(context, text, (int)length);
-    if (document == NULL) {
-        fail_syntax(&o, context);
-    } else {
-        read_document(&o, document);
-    }
-    xmlFreeDoc(document);
-    xmlFreeParserCtxt(context);
+    read_text(&o, text, (int)length);
     mhi_c_locale_end(saved);
+    xmlSetStructuredErrorFunc(handler_data, handler);
     return mhi_build_finish(&o.b, description);
 }

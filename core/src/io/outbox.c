@@ -263,8 +263,8 @@ static void displace(const mhe_outbox *outbox, mhi_outbox_file *file) {
     const int at = outbox->folder;
     if (file->placed == EXCHANGED) {
         (void)renameat2(at, file->temporary, at, file->name, RENAME_EXCHANGE);
-    } else if (file->placed == PLACED) {
-        (void)renameat(at, file->name, at, file->temporary);
+    } else if (file->placed == PLACED) { /* nothing was there; removing fails less than renaming */
+        (void)unlinkat(at, file->name, 0);
     }
     file->placed = NOT_PLACED;
 }

@@ -39,7 +39,9 @@ mhe_status mhi_slurp(const char *path, char **text, size_t *length, mhe_error *e
     *length = 0;
     FILE *file = fopen(path, "rb");
     if (file == NULL) {
-        return mhe_fail(err, MHE_E_INPUT, "%s: cannot be opened: %s", path, strerror(errno));
+        return errno == ENOMEM
+                   ? mhe_fail(err, MHE_E_MEMORY, "%s: no memory to open the file", path)
+                   : mhe_fail(err, MHE_E_INPUT, "%s: cannot be opened: %s", path, strerror(errno));
     }
     struct stat info;
     mhe_status status = fstat(fileno(file), &info) == 0 && S_ISDIR(info.st_mode)

@@ -7,7 +7,7 @@
 #include <string.h>
 
 static void free_texts(char **texts, int32_t n) {
-    for (int32_t i = 0; i < n; i++) {
+    for (int32_t i = 0; texts != NULL && i < n; i++) {
         free(texts[i]);
     }
     free(texts);

@@ -31,6 +31,7 @@ void mhi_table_warn(mhi_table_reader *reader, const char *format, ...) {
     char **grown = realloc(table->warnings, sizeof *grown * ((size_t)table->n_warnings + 1));
     table->warnings = grown != NULL ? grown : table->warnings;
     char *line = grown != NULL && n > 0 ? strdup(where) : NULL;
+    reader->no_memory = reader->no_memory || line == NULL;
     if (line != NULL) {
         table->warnings[table->n_warnings++] = line;
     }
@@ -47,6 +48,7 @@ static void count_kinds(mhi_table_reader *reader) {
         }
         (void)snprintf(line, sizeof line, "%s%s", table->warnings[kind->place], rest);
         char *copy = strdup(line);
+        reader->no_memory = reader->no_memory || copy == NULL;
         if (copy != NULL) {
             free(table->warnings[kind->place]);
             table->warnings[kind->place] = copy;
@@ -213,6 +215,9 @@ mhe_status mhi_table_finish(mhi_table_reader *reader, mhe_status status, mhi_tab
     }
     if (status == MHE_OK) {
         count_kinds(reader);
+    }
+    if (status == MHE_OK && reader->no_memory) {
+        status = mhe_fail(reader->err, MHE_E_MEMORY, "%s: out of memory", reader->table->path);
     }
     mhi_c_locale_end(reader->locale);
     free(reader->cells);

@@ -21,6 +21,7 @@ typedef struct mhi_table_reader {
     int32_t n_equal, equal_line; /* rows whose time is that of the row before; the first's line */
     int32_t n_missing;           /* empty cells */
     mhi_kinds kinds;             /* of warnings */
+    int32_t no_memory;           /* for one of them: the table is not handed out */
     mhi_decoded decoded;
     char *spent; /* text before `at` that may be given back from here on; NULL: it is lent */
     mhi_c_locale locale;

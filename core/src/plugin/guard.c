@@ -103,6 +103,9 @@ mhe_status mhi_guard(mhe_status (*call)(void *data), void *data, mhe_error *err)
     guard g = {.outer = innermost};
     if (sigsetjmp(g.back, 0) != 0) {
         innermost = g.outer;
+        if (strcmp(g.type, "std::bad_alloc") == 0) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory (std::bad_alloc)");
+        }
         return g.type[0] != '\0' ? mhe_fail(err, MHE_E_PLUGIN, "threw a C++ exception (%s)", g.type)
                                  : mhe_fail(err, MHE_E_PLUGIN, "called std::terminate");
     }

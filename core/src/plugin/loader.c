@@ -17,11 +17,18 @@ static mhe_status truncated(mhe_error *err) {
     return mhe_fail(err, MHE_E_PLUGIN, "the file is truncated");
 }
 
+static mhe_status unreadable(mhe_error *err) {
+    return mhe_fail(err, MHE_E_PLUGIN, "cannot be read: %s", strerror(errno));
+}
+
 /* dlopen maps a file without asking whether it is whole and then dies of SIGBUS where it is not, so
  * the parts that the ELF header promises are looked for first. */
 static mhe_status check_elf(int file, off_t size, mhe_error *err) {
     ElfW(Ehdr) head;
     ssize_t got = pread(file, &head, sizeof head, 0);
+    if (got < 0) {
+        return unreadable(err);
+    }
     if (got < (ssize_t)SELFMAG || memcmp(head.e_ident, ELFMAG, SELFMAG) != 0) {
         return mhe_fail(err, MHE_E_PLUGIN, "not a shared object (no ELF header)");
     }
@@ -39,8 +46,12 @@ static mhe_status check_elf(int file, off_t size, mhe_error *err) {
     for (int i = 0; i < head.e_phnum; i++) {
         ElfW(Phdr) part;
         const ElfW(Off) at = head.e_phoff + (ElfW(Off))i * sizeof part;
-        if (at > end || pread(file, &part, sizeof part, (off_t)at) != (ssize_t)sizeof part ||
-            part.p_offset > end || part.p_filesz > end - part.p_offset) {
+        got = at > end ? 0 : pread(file, &part, sizeof part, (off_t)at);
+        if (got < 0) {
+            return unreadable(err);
+        }
+        if (got != (ssize_t)sizeof part || part.p_offset > end ||
+            part.p_filesz > end - part.p_offset) {
             return truncated(err);
         }
     }
@@ -52,7 +63,7 @@ static mhe_status check_file(const char *path, mhe_error *err) {
     struct stat info;
     mhe_status status = MHE_OK;
     if (file < 0 || fstat(file, &info) != 0) {
-        status = mhe_fail(err, MHE_E_PLUGIN, "cannot be read: %s", strerror(errno));
+        status = unreadable(err);
     } else if (!S_ISREG(info.st_mode)) {
         status = mhe_fail(err, MHE_E_PLUGIN, "not a file");
     } else {
@@ -88,7 +99,9 @@ static mhe_status call_entry(void *data) {
 static mhe_status load(const char *path, const mhe_library **library, mhe_error *err) {
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (handle == NULL) {
-        return mhe_fail(err, MHE_E_PLUGIN, "cannot be linked: %.500s", link_error(path));
+        const char *why = link_error(path);
+        return mhe_fail(err, strstr(why, strerror(ENOMEM)) ? MHE_E_MEMORY : MHE_E_PLUGIN,
+                        "cannot be linked: %.500s", why);
     }
     entry_call call = {0};
     void *symbol = dlsym(handle, MHE_PLUGIN_ENTRY);

@@ -237,6 +237,9 @@ static mhe_status scan_folder(mhi_registry *r, folder *f, mhe_error *err) {
     int n = -1;
     if (mhi_trust_folder(f->path, &why) == MHE_OK) {
         n = scandir(f->path, &files, is_shared_object, by_name);
+        if (n < 0 && errno == ENOMEM) {
+            return no_memory(err);
+        }
         (void)mhe_fail(&why, MHE_E_PLUGIN, "%s", n < 0 ? strerror(errno) : "");
     }
     mhe_status status = MHE_OK;
