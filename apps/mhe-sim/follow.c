@@ -79,8 +79,7 @@ static mhe_status look_ahead(follow *f, double time, mhe_estimate *estimate, int
 
 static void take_controls(follow *f, const mhe_estimate *estimate) {
     simulation *s = &f->simulation;
-    const int driven = s->n_x > 2 * s->n_q;
-    const double *u = driven ? estimate->excitation : estimate->activation;
+    const double *u = estimate->excitation != NULL ? estimate->excitation : estimate->activation;
     for (int32_t i = 0; i < s->n_m; i++) {
         s->u[i] = fmin(fmax(u[i], 0), 1);
     }
@@ -108,8 +107,11 @@ static mhe_status follow_path(follow *f, mhe_error *err) {
         if (k == 0) {
             memcpy(s->x, estimate.q, sizeof(double) * (size_t)s->n_q);
             memcpy(s->x + s->n_q, estimate.qdot, sizeof(double) * (size_t)s->n_q);
-            memcpy(s->x + 2 * s->n_q, estimate.activation,
-                   sizeof(double) * (size_t)(s->n_x - 2 * s->n_q));
+            status = mhi_system_equilibrium(s->context, s->x, s->x + s->n_q, estimate.activation,
+                                            s->x, err);
+        }
+        if (status != MHE_OK) {
+            return status;
         }
         take_controls(f, &estimate);
         status = simulation_write(s, time, err);

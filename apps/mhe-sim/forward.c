@@ -62,8 +62,7 @@ static mhe_status first_state(forward *f, mhe_error *err) {
             s->x[part * s->n_q + i] = given[part]->n > 0 ? given[part]->values[i] : unset;
         }
     }
-    memcpy(s->x + 2 * s->n_q, s->u, sizeof(double) * (size_t)(s->n_x - 2 * s->n_q));
-    return MHE_OK;
+    return mhi_system_equilibrium(s->context, s->x, s->x + s->n_q, s->u, s->x, err);
 }
 
 static mhe_status integrate(forward *f, mhe_error *err) {

@@ -5,6 +5,7 @@
 #include "io/table.h"
 
 #include <math.h>
+#include <string.h>
 
 #define DEGREES (180 / 3.14159265358979323846)
 #define MOTIONS_MAX 4 /* as many shades as a figure has */
@@ -19,18 +20,27 @@ typedef struct motions {
     figure figure;
 } motions;
 
+/* The first column whose label begins so; past the last where there is none. */
+static int32_t first_of(const mhi_table *t, const char *prefix) {
+    int32_t i = 0;
+    while (i < t->n_columns && strncmp(t->labels[i], prefix, strlen(prefix)) != 0) {
+        i++;
+    }
+    return i;
+}
+
 static mhe_status read_all(motions *m, const char *dir, const char *const *outputs,
                            mhe_error *err) {
-    const int32_t n_columns = 2 * m->n_q + 3 * m->n_m;
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < m->n && status == MHE_OK; i++) {
         mhi_text path = {0};
         mhi_text_add(&path, "%s/%s/reference.sto", dir, outputs[i]);
         status = path.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                              : mhi_sto_read(path.data, &m->table[i], err);
-        if (status == MHE_OK && m->table[i]->n_columns != n_columns) {
-            status = mhe_fail(err, MHE_E_INPUT, "%s: %d columns, not %d", path.data,
-                              (int)m->table[i]->n_columns, (int)n_columns);
+        if (status == MHE_OK && (m->table[i]->n_columns != m->table[0]->n_columns ||
+                                 first_of(m->table[i], "q_") + m->n_q > m->table[i]->n_columns ||
+                                 first_of(m->table[i], "e_") + m->n_m > m->table[i]->n_columns)) {
+            status = mhe_fail(err, MHE_E_INPUT, "%s: not the columns of these motions", path.data);
         }
         mhi_text_free(&path);
     }
@@ -70,7 +80,7 @@ static double peak(const motions *m, int32_t column) {
 }
 
 static void add_muscles(motions *m, figure_block *block) {
-    const int32_t first = 2 * m->n_q + m->n_m;
+    const int32_t first = first_of(m->table[0], "e_");
     *block = (figure_block){
         .heading = "Excitations", .axis = "excitation (1)", .least = 0.01, .holds_zero = 1};
     for (int32_t i = 0; i < m->n_m; i++) {

@@ -77,7 +77,7 @@ static void compare(tracking *w, ptrdiff_t k) {
         w->report->qdot = fmax(w->report->qdot, fabs(s->x[s->n_q + i] - x[s->n_q + i]));
     }
     for (int32_t i = 0; i < s->n_m; i++) {
-        const double force = s->row[2 * s->n_q + 2 * s->n_m + i];
+        const double force = s->force[i];
         w->report->peak_force = fmax(w->report->peak_force, force);
     }
 }
@@ -93,7 +93,7 @@ static mhe_status move(tracking *w, mhe_sink *forces, mhe_error *err) {
         status = simulation_write(s, time, err);
         if (status == MHE_OK) {
             compare(w, k);
-            status = mhe_sink_row(forces, time, s->row + 2 * s->n_q + 2 * s->n_m, err);
+            status = mhe_sink_row(forces, time, s->force, err);
         }
         if (status == MHE_OK && k < t->n) {
             status = simulation_step(s, time, err);

@@ -45,12 +45,16 @@ mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *
     s->x = MHI_TAKE(&s->arena, double, f->n_x);
     s->x_next = MHI_TAKE(&s->arena, double, f->n_x);
     s->u = MHI_TAKE(&s->arena, double, f->n_u);
-    s->row = MHI_TAKE(&s->arena, double, 2 * f->n_q + 3 * f->n_m);
+    s->n_columns = f->n_q + f->n_q + 3 * f->n_m + f->n_z;
+    s->row = MHI_TAKE(&s->arena, double, s->n_columns);
     s->marker = MHI_TAKE(&s->arena, double, 3 * d->n_markers);
     s->muscles = MHI_TAKE(&s->arena, const char *, f->n_m);
     if (!s->x || !s->x_next || !s->u || !s->row || !s->marker || !s->muscles) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
+    s->activation = s->row + f->n_q + f->n_q;
+    s->excitation = s->activation + f->n_m;
+    s->force = s->excitation + f->n_m;
     for (int32_t i = 0; i < f->n_m; i++) {
         s->muscles[i] = d->muscles[i].name;
     }
@@ -69,23 +73,48 @@ mhe_status simulation_steps(const simulation *s, const mhi_table *input, int32_t
     return MHE_OK;
 }
 
+/* "<prefix>_<name>", n of them; 0: out of memory. */
+static int add_labels(simulation *s, const char *prefix, const char *const *names, int32_t n,
+                      const char ***labels) {
+    for (int32_t i = 0; i < n; i++) {
+        const char *label = mhi_arena_format(&s->arena, "%s_%s", prefix, names[i]);
+        if (label == NULL) {
+            return 0;
+        }
+        *(*labels)++ = label;
+    }
+    return 1;
+}
+
+/* Labels of a row; NULL: out of memory. */
+static const char *const *reference_labels(simulation *s) {
+    const mhe_layout *l = mhi_system_face(s->system)->layout;
+    const char **labels = MHI_TAKE(&s->arena, const char *, s->n_columns), **next = labels;
+    int ok = labels != NULL;
+    for (int32_t b = 0; b < l->n_blocks && ok; b++) {
+        const mhe_block *block = mhe_layout_at(l, b);
+        if (block->role == MHE_ROLE_STATE && block->structure == MHE_STRUCTURE_DENSE) {
+            ok = add_labels(s, block->name, block->entry_names, block->count, &next);
+        }
+    }
+    ok = ok && add_labels(s, "a", s->muscles, s->n_m, &next) &&
+         add_labels(s, "e", s->muscles, s->n_m, &next) &&
+         add_labels(s, "F", s->muscles, s->n_m, &next);
+    for (int32_t b = 0; b < l->n_blocks && ok; b++) {
+        const mhe_block *block = mhe_layout_at(l, b);
+        if (block->role == MHE_ROLE_STATE && block->structure == MHE_STRUCTURE_MUSCLE) {
+            ok = add_labels(s, block->name, block->entry_names, block->count, &next);
+        }
+    }
+    return ok ? labels : NULL;
+}
+
 mhe_status simulation_files(simulation *s, const char *folder, const char *input, mhe_error *err) {
-    static const char *const prefix[] = {"q", "qdot", "a", "e", "F"};
     const mhe_description *d = mhi_system_description(s->system);
-    const int32_t n_columns = 2 * s->n_q + 3 * s->n_m;
-    const char **labels = MHI_TAKE(&s->arena, const char *, n_columns);
+    const char *const *labels = reference_labels(s);
     const char **markers = MHI_TAKE(&s->arena, const char *, d->n_markers);
     if (labels == NULL || markers == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    for (int32_t part = 0, n = 0; part < 5; part++) {
-        for (int32_t i = 0; i < (part < 2 ? s->n_q : s->n_m); i++) {
-            const char *name = part < 2 ? d->coordinates[i].name : d->muscles[i].name;
-            labels[n] = mhi_arena_format(&s->arena, "%s_%s", prefix[part], name);
-            if (labels[n++] == NULL) {
-                return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-            }
-        }
     }
     for (int32_t i = 0; i < d->n_markers; i++) {
         markers[i] = d->markers[i].name;
@@ -99,7 +128,7 @@ mhe_status simulation_files(simulation *s, const char *folder, const char *input
         status = mhe_outbox_spare(s->outbox, input, err);
     }
     if (status == MHE_OK) {
-        status = mhe_sink_sto(s->outbox, "reference.sto", "reference", labels, n_columns,
+        status = mhe_sink_sto(s->outbox, "reference.sto", "reference", labels, s->n_columns,
                               &s->reference, err);
     }
     if (status == MHE_OK) {
@@ -124,10 +153,12 @@ mhe_status simulation_write(simulation *s, double time, mhe_error *err) {
         return status;
     }
     double *row = s->row;
-    memcpy(row, s->x, sizeof(double) * (size_t)(2 * s->n_q));
-    memcpy(row + 2 * s->n_q, a, n_m);
-    memcpy(row + 2 * s->n_q + s->n_m, s->u, n_m);
-    memcpy(row + 2 * s->n_q + 2 * s->n_m, muscles.force, n_m);
+    const mhe_system *f = mhi_system_face(s->system);
+    memcpy(row, s->x, sizeof(double) * (size_t)(s->activation - row));
+    memcpy(s->activation, a, n_m);
+    memcpy(s->excitation, s->u, n_m);
+    memcpy(s->force, muscles.force, n_m);
+    memcpy(s->force + f->n_m, s->x + f->n_x - f->n_z, sizeof(double) * (size_t)f->n_z);
     status = mhe_sink_row(s->reference, time, row, err);
     if (status == MHE_OK) {
         status = mhi_system_markers(s->context, s->x, s->marker, NULL, err);

@@ -22,7 +22,11 @@ typedef struct simulation {
     mhi_system_context *context;
     const mhe_integrator_ops *integrator;
     void *integrator_self, *integrator_context;
-    double *x_next, *row, *marker;
+    double *x_next, *marker;
+    double *row; /* [n_columns] of reference.sto: q, qdot, activations, excitations, forces, then
+                  * what muscles have of other states */
+    int32_t n_columns;
+    double *activation, *excitation, *force; /* [n_m] in the row */
     mhe_outbox *outbox;
     mhe_sink *reference, *trc, *emg;
     mhi_arena arena;

@@ -13,8 +13,11 @@
 static void expect_limits(const char *config, const double expected[4]) {
     test_fixture f;
     assert_int_equal(test_fixture_open(&f, config), MHE_OK);
+    const mhe_block *torque =
+        mhe_layout_find(mhi_system_face(f.system)->layout, MHE_ROLE_CONTROL, "residual_torque");
+    assert_non_null(torque);
     for (int i = 0; i < 4; i++) {
-        assert_true(f.estimator->torque_max[i] == expected[i]);
+        assert_true(torque->upper[i] == expected[i] && torque->lower[i] == -expected[i]);
     }
     test_fixture_close(&f);
 }

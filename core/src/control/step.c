@@ -58,24 +58,11 @@ static mhe_status create_problem(mhi_step_work *w, mhe_error *err) {
 
 /* Those of the whole run, at every node. */
 static void general_bounds(const mhi_step_work *w, int32_t k) {
-    const mhi_bounds_section *b = &w->setup->run->bounds;
-    const mhe_system *f = w->face;
-    double *lower = mhi_ocp_x_lower(w->ocp, k), *upper = mhi_ocp_x_upper(w->ocp, k);
-    for (int32_t i = 0; i < f->n_q; i++) {
-        lower[i] = w->description->coordinates[i].lower;
-        upper[i] = w->description->coordinates[i].upper;
-        lower[f->n_q + i] = -b->velocity_max;
-        upper[f->n_q + i] = b->velocity_max;
-    }
-    for (int32_t i = 0; i < f->n_d; i++) {
-        lower[2 * f->n_q + i] = b->activation_min;
-        upper[2 * f->n_q + i] = b->activation_max;
-    }
-    for (int32_t i = 0; i < f->n_u && k < w->step->intervals; i++) {
-        const double low = f->n_d > 0 ? b->excitation_min : b->activation_min;
-        const double high = f->n_d > 0 ? b->excitation_max : b->activation_max;
-        mhi_ocp_u_lower(w->ocp, k)[i] = i < f->n_m ? low : -b->residual_torque_max;
-        mhi_ocp_u_upper(w->ocp, k)[i] = i < f->n_m ? high : b->residual_torque_max;
+    mhi_layout_bounds(w->face->layout, MHE_ROLE_STATE, mhi_ocp_x_lower(w->ocp, k),
+                      mhi_ocp_x_upper(w->ocp, k));
+    if (k < w->step->intervals) {
+        mhi_layout_bounds(w->face->layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(w->ocp, k),
+                          mhi_ocp_u_upper(w->ocp, k));
     }
 }
 
@@ -85,8 +72,7 @@ static mhe_status choose(const mhi_step_work *w, const mhi_step_bound *bound, co
     memset(chosen, bound->of.n == 0, (size_t)part->n);
     for (int32_t k = 0; k < bound->of.n; k++) {
         int32_t i = 0;
-        while (i < part->n &&
-               strcmp(mhi_part_entry(w->description, part, i), bound->of.values[k]) != 0) {
+        while (i < part->n && strcmp(part->names[i], bound->of.values[k]) != 0) {
             i++;
         }
         if (i == part->n) {
@@ -148,8 +134,7 @@ static mhe_status apply_bound(mhi_step_work *w, const mhi_step_bound *b, mhe_err
                 status = mhi_step_fail(
                     w, MHE_E_CONFIG, err,
                     "bounds of '%s', %s, at %g s: %g .. %g within %g .. %g leaves nothing",
-                    b->signal, mhi_part_entry(w->description, &part, i), time, low, high, lower[at],
-                    upper[at]);
+                    b->signal, part.names[i], time, low, high, lower[at], upper[at]);
             }
             lower[at] = low;
             upper[at] = high;
@@ -193,13 +178,17 @@ static mhe_status start_from_steps(mhi_step_work *w, mhi_trajectory *t, mhe_erro
 }
 
 /* From the middle of the first bounds to `toward`, smoothly (minimum jerk). */
-static mhe_status start_anew(const mhi_step_work *w, mhi_trajectory *t, mhe_error *err) {
+static mhe_status start_anew(mhi_step_work *w, mhi_trajectory *t, mhe_error *err) {
     const mhe_real_list *toward = &w->step->toward;
     const int32_t n_q = w->face->n_q;
     if (toward->n != 0 && toward->n != n_q) {
         return mhi_step_fail(w, MHE_E_CONFIG, err,
                              "toward: %d values; the model has %d coordinates", (int)toward->n,
                              (int)n_q);
+    }
+    double *effort = MHI_TAKE(&w->arena, double, w->face->n_m);
+    if (effort == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     const double duration = t->n * t->interval;
     for (int32_t k = 0; k <= t->n; k++) {
@@ -214,11 +203,16 @@ static mhe_status start_anew(const mhi_step_work *w, mhi_trajectory *t, mhe_erro
             x[i] = from + (to - from) * way;
             x[n_q + i] = (to - from) * speed;
         }
-        for (int32_t i = 0; i < w->face->n_d; i++) {
-            x[2 * n_q + i] = START_EFFORT;
+        for (int32_t i = 0; i < w->face->n_m; i++) {
+            effort[i] = START_EFFORT;
         }
-        for (int32_t i = 0; i < w->face->n_m && k < t->n; i++) {
-            t->u[(ptrdiff_t)k * t->n_u + i] = START_EFFORT;
+        mhe_status status =
+            mhi_system_equilibrium(mhi_ocp_context(w->ocp), x, x + n_q, effort, x, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+        if (k < t->n) {
+            memcpy(t->u + (ptrdiff_t)k * t->n_u, effort, sizeof *effort * (size_t)w->face->n_m);
         }
     }
     return MHE_OK;

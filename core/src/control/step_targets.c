@@ -72,7 +72,7 @@ static mhe_status from_file(mhi_step_work *w, const char *signal, const mhi_part
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     for (int32_t i = 0; i < part->n; i++) {
-        names[i] = mhi_part_entry(w->description, part, i);
+        names[i] = part->names[i];
     }
     mhe_status status = mhi_sto_read(path, &table, err);
     uint8_t *used = status == MHE_OK ? MHI_TAKE(&w->arena, uint8_t, table->n_columns) : NULL;
@@ -86,7 +86,8 @@ static mhe_status from_file(mhi_step_work *w, const char *signal, const mhi_part
     for (int32_t k = 0; k <= w->step->intervals && status == MHE_OK; k++) {
         for (int32_t i = 0; i < part->n; i++) {
             const double time = table->time[0] + k * w->interval;
-            const double scale = table->in_degrees && !part->muscles ? acos(-1) / 180 : 1;
+            const int angle = strncmp(part->units[i], "rad", 3) == 0;
+            const double scale = table->in_degrees && angle ? acos(-1) / 180 : 1;
             target(w, signal, k)[i] =
                 column[i] < 0 ? NAN : scale * mhi_column_at(table, column[i], time, part->in_u);
         }
@@ -101,7 +102,7 @@ mhe_status mhi_step_targets(mhi_step_work *w, mhe_error *err) {
     for (int32_t i = 0; i < targets->n && status == MHE_OK; i++) {
         const char *signal = targets->keys[i], *source = targets->values[i];
         mhi_part part;
-        if (!mhi_part_find(w->face, signal, &part)) {
+        if (!mhi_part_find(w->face, signal, &part) || target(w, signal, 0) == NULL) {
             return mhi_step_fail(w, MHE_E_CONFIG, err,
                                  "targets: '%s' is not q, qdot, activation, excitation or "
                                  "residual_torque of this problem",

@@ -48,24 +48,14 @@ double mhi_trajectory_duration(const mhi_trajectory *const *motions, int32_t n_m
 }
 
 int32_t mhi_part_find(const mhe_system *f, const char *name, mhi_part *part) {
-    const int driven = f->n_d > 0;
-    const struct {
-        const char *name;
-        mhi_part part;
-    } parts[] = {{"q", {0, 0, f->n_q, 0}},
-                 {"qdot", {0, f->n_q, f->n_q, 0}},
-                 {"activation", {!driven, driven ? 2 * f->n_q : 0, f->n_m, 1}},
-                 {"excitation", {1, 0, driven ? f->n_m : 0, 1}},
-                 {"residual_torque", {1, f->n_m, f->n_r, 0}}};
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
-        if (strcmp(parts[i].name, name) == 0 && parts[i].part.n > 0) {
-            *part = parts[i].part;
+    static const int32_t roles[] = {MHE_ROLE_STATE, MHE_ROLE_CONTROL};
+    for (int32_t i = 0; i < 2; i++) {
+        const mhe_block *block = mhe_layout_find(f->layout, roles[i], name);
+        if (block != NULL && block->count > 0) {
+            *part = (mhi_part){roles[i] == MHE_ROLE_CONTROL, block->first, block->count,
+                               block->entry_names, block->units};
             return 1;
         }
     }
     return 0;
-}
-
-const char *mhi_part_entry(const mhe_description *d, const mhi_part *part, int32_t i) {
-    return part->muscles ? d->muscles[i].name : d->coordinates[i].name;
 }

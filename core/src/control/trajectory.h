@@ -26,17 +26,16 @@ void mhi_trajectory_at(const mhi_trajectory *const *motions, int32_t n_motions, 
                        double *x, double *u);
 double mhi_trajectory_duration(const mhi_trajectory *const *motions, int32_t n_motions); /* s */
 
-/* A named part of a state or control: "q", "qdot", "activation", "excitation", "residual_torque".
- */
+/* A block of states or controls, by its name: "q", "qdot", "activation", "excitation",
+ * "residual_torque", what muscles have more. */
 typedef struct mhi_part {
-    int32_t in_u;      /* part of the control, else of the state */
-    int32_t offset, n; /* where it stands there */
-    int32_t muscles;   /* one entry a muscle, else a coordinate */
+    int32_t in_u;             /* part of the control, else of the state */
+    int32_t offset, n;        /* where it stands there */
+    const char *const *names; /* [n] of its entries */
+    const char *const *units; /* [n] */
 } mhi_part;
 
 /* 0 where the system has no such part. */
 int32_t mhi_part_find(const mhe_system *system, const char *name, mhi_part *part);
-/* Name of entry i. */
-const char *mhi_part_entry(const mhe_description *description, const mhi_part *part, int32_t i);
 
 #endif

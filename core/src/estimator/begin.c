@@ -9,8 +9,9 @@ mhe_status mhi_begin_create(mhi_begin *b, const mhi_system *system, mhi_system_c
     *b = (mhi_begin){.n_q = n_q,
                      .q = MHI_TAKE(arena, double, n_q),
                      .v = MHI_TAKE(arena, double, n_q),
+                     .activation = MHI_TAKE(arena, double, mhi_system_face(system)->n_m),
                      .distance = MHI_TAKE(arena, double, nodes)};
-    if (b->q == NULL || b->v == NULL || b->distance == NULL) {
+    if (b->q == NULL || b->v == NULL || b->activation == NULL || b->distance == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     mhi_begin_forget(b);
@@ -130,14 +131,31 @@ static void guess_velocities(mhe_estimator *e, int32_t k, double *v) {
     }
 }
 
+/* The muscles' states of node k in equilibrium with the EMG; where there is none, of a usual size.
+ */
+static void guess_states(mhe_estimator *e, int32_t k, double *x) {
+    const mhe_layout *layout = mhi_system_face(e->system)->layout;
+    guess_controls(e, k, e->begin.activation);
+    if (mhi_system_equilibrium(mhi_ocp_context(e->ocp), x, x + e->n_q, e->begin.activation, x,
+                               NULL) == MHE_OK) {
+        return;
+    }
+    for (int32_t b = 0; b < layout->n_blocks; b++) {
+        const mhe_block *block = mhe_layout_at(layout, b);
+        for (int32_t i = 0; i < block->count && block->role == MHE_ROLE_STATE &&
+                            block->structure == MHE_STRUCTURE_MUSCLE;
+             i++) {
+            x[block->first + i] = mhi_clip(block->scale[i], block->lower[i], block->upper[i]);
+        }
+    }
+}
+
 /* Velocities by slopes, muscles by the EMG. */
 static void guess_rest(mhe_estimator *e) {
     for (int32_t k = 0; k <= e->window.n; k++) {
         double *x = mhi_row(e->window.guess_x, k, e->n_x);
         guess_velocities(e, k, x + e->n_q);
-        if (e->n_x > 2 * e->n_q) {
-            guess_controls(e, k, x + 2 * e->n_q);
-        }
+        guess_states(e, k, x);
         if (k < e->window.n) {
             double *u = mhi_row(e->window.guess_u, k, e->n_u);
             guess_controls(e, k, u);

@@ -9,9 +9,10 @@
 #include <mhe/estimator.h>
 
 typedef struct mhi_begin {
-    mhi_start *start; /* postures from markers */
-    double *q, *v;    /* known first state [n_q], NaN where free */
-    double *distance; /* [n+1] of the markers at each node */
+    mhi_start *start;   /* postures from markers */
+    double *q, *v;      /* known first state [n_q], NaN where free */
+    double *activation; /* [n_m] of a node, guessed */
+    double *distance;   /* [n+1] of the markers at each node */
     int32_t n_q;
     int32_t has_posture; /* a channel that tells the posture came, be its values missing */
     int32_t waited;      /* used frames before the first window for want of a posture */

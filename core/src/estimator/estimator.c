@@ -2,6 +2,7 @@
 /* estimator.c: the public estimator: frames in, estimates out. */
 #include "estimator/estimator_private.h"
 #include "io/model_file.h"
+#include "model/bounds.h"
 #include "plugin/instance.h"
 
 #include <math.h>
@@ -56,6 +57,11 @@ static mhe_status locate(const mhi_run *run, mhe_status status, mhe_error *err) 
 
 static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     const mhi_run *run = e->run;
+    mhi_bounds bounds;
+    mhe_status status = mhi_bounds_read(run, e->description, &e->arena, &bounds, err);
+    if (status != MHE_OK) {
+        return status;
+    }
     const mhi_system_setup system = {.host = e->host,
                                      .description = e->description,
                                      .model = run->model.plugin,
@@ -63,8 +69,9 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
                                      .muscle = run->muscle.plugin,
                                      .muscle_config = run->muscle.config,
                                      .formulation = run->formulation,
-                                     .residual_torques = run->bounds.residual_torques};
-    mhe_status status = mhi_system_create(&system, &e->system, err);
+                                     .residual_torques = run->bounds.residual_torques,
+                                     .bounds = &bounds};
+    status = mhi_system_create(&system, &e->system, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -99,13 +106,7 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
     const mhi_run *run = e->run;
     const int32_t n = run->horizon.window;
     const double interval = mhi_ocp_problem(e->ocp)->interval; /* a guess */
-    e->torque_max = MHI_TAKE(&e->arena, double, e->n_q);
-
-    mhe_status status =
-        e->torque_max == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
-    if (status == MHE_OK) {
-        status = mhi_window_create(&e->window, n, e->n_x, e->n_u, &e->arena, err);
-    }
+    mhe_status status = mhi_window_create(&e->window, n, e->n_x, e->n_u, &e->arena, err);
     if (status == MHE_OK) {
         status =
             mhi_channels_create(run, e->ocp, e->description, n + 1, &e->arena, &e->channels, err);
@@ -190,9 +191,6 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
     }
     if (status == MHE_OK) {
         status = start_from_config(e, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_estimator_limits(e, err);
     }
     if (status != MHE_OK) {
         mhe_estimator_close(e);

@@ -55,7 +55,6 @@ struct mhe_estimator {
     mhi_pace pace;
     mhi_output output;
     const double **given; /* [channels] what the frame in work says, scratch */
-    double *torque_max;   /* largest residual torques [n_q], N m; 0: none */
     mhi_arena arena;
 };
 
@@ -67,9 +66,6 @@ struct mhe_estimator {
 void mhi_phase_on(mhe_estimator *e, int32_t event);
 int32_t mhi_phase_begun(const mhe_estimator *e);   /* it has a start */
 int32_t mhi_phase_settled(const mhe_estimator *e); /* and its first state is fixed */
-
-/* limits.c: torque_max from the bounds section. MHE_E_CONFIG: no such coordinate, no number. */
-mhe_status mhi_estimator_limits(mhe_estimator *e, mhe_error *err);
 
 /* solve.c: solves; the outcome as MHE_FRAME_*. MHE_E_INTERRUPTED: told to stop, no outcome. */
 mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *frame_status,

@@ -62,27 +62,15 @@ static void shift_rows(double *array, int32_t n, int32_t width) {
     memmove(array, array + width, sizeof(double) * (size_t)(n - 1) * (size_t)width);
 }
 
-/* Coordinate ranges, velocities, activations, controls. */
+/* The layout's, at every node. */
 static void set_general_bounds(mhe_estimator *e) {
-    const mhi_bounds_section *b = &e->run->bounds;
-    const int32_t n_a = e->n_x - 2 * e->n_q;
-    const double low = n_a > 0 ? b->excitation_min : b->activation_min;
-    const double high = n_a > 0 ? b->excitation_max : b->activation_max;
+    const mhe_layout *layout = mhi_system_face(e->system)->layout;
     for (int32_t k = 0; k <= e->window.n; k++) {
-        double *lower = mhi_ocp_x_lower(e->ocp, k), *upper = mhi_ocp_x_upper(e->ocp, k);
-        for (int32_t i = 0; i < e->n_q; i++) {
-            lower[i] = e->description->coordinates[i].lower;
-            upper[i] = e->description->coordinates[i].upper;
-            lower[e->n_q + i] = -b->velocity_max;
-            upper[e->n_q + i] = b->velocity_max;
-        }
-        for (int32_t i = 0; i < n_a; i++) {
-            lower[2 * e->n_q + i] = b->activation_min;
-            upper[2 * e->n_q + i] = b->activation_max;
-        }
-        for (int32_t i = 0; i < e->n_u && k < e->window.n; i++) {
-            mhi_ocp_u_lower(e->ocp, k)[i] = i < e->n_m ? low : -e->torque_max[i - e->n_m];
-            mhi_ocp_u_upper(e->ocp, k)[i] = i < e->n_m ? high : e->torque_max[i - e->n_m];
+        mhi_layout_bounds(layout, MHE_ROLE_STATE, mhi_ocp_x_lower(e->ocp, k),
+                          mhi_ocp_x_upper(e->ocp, k));
+        if (k < e->window.n) {
+            mhi_layout_bounds(layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(e->ocp, k),
+                              mhi_ocp_u_upper(e->ocp, k));
         }
     }
 }
