@@ -104,6 +104,74 @@ static void add_plugins(cJSON *root, const mhi_run *run) {
     }
 }
 
+static const char *weight_name(int32_t weight) {
+    return weight == MHI_FINDING_NOTE       ? "note"
+           : weight == MHI_FINDING_DOUBTFUL ? "doubtful"
+                                            : "not usable";
+}
+
+static void add_verdict(cJSON *root, const summary *s) {
+    cJSON *verdict = cJSON_AddObjectToObject(root, "verdict");
+    cJSON_AddStringToObject(verdict, "usable", mhi_usable(mhi_findings_weight(s->findings)));
+    cJSON *list = cJSON_AddArrayToObject(verdict, "findings");
+    for (int32_t i = 0; i < s->findings->n; i++) {
+        const mhi_finding *f = &s->findings->all[i];
+        cJSON *one = cJSON_CreateObject();
+        cJSON_AddStringToObject(one, "weight", weight_name(f->weight));
+        cJSON_AddStringToObject(one, "what", f->text);
+        cJSON_AddStringToObject(one, "remedy", mhi_finding_remedy(f));
+        cJSON_AddItemToArray(list, one);
+    }
+    cJSON *dropped = cJSON_AddArrayToObject(root, "dropped");
+    for (int32_t i = 0; i < s->model->n_unsupported; i++) {
+        cJSON_AddItemToArray(dropped, cJSON_CreateString(s->model->unsupported[i]));
+    }
+}
+
+/* Shares of the estimates; rms in m or, of muscles, as a share of the MVC. */
+static void add_channel(cJSON *channels, const char *prefix, const char *name, double present,
+                        double rms, double left_out) {
+    mhi_text key = {0};
+    mhi_text_add(&key, "%s%s",
+                 cJSON_GetObjectItemCaseSensitive(channels, name) == NULL ? "" : prefix, name);
+    cJSON *one = cJSON_AddObjectToObject(channels, key.data == NULL ? name : key.data);
+    add_number(one, "present", present);
+    add_number(one, "rms", rms);
+    add_number(one, "left_out", left_out);
+    mhi_text_free(&key);
+}
+
+/* Markers and EMG as wholes, then each by its name. */
+static void add_channels(cJSON *root, const summary *s) {
+    cJSON *channels = cJSON_AddObjectToObject(root, "channels");
+    const mhe_estimator_info *f = &s->info;
+    for (int32_t kind = 0; kind < 2; kind++) {
+        const int32_t n = kind == 0 ? f->n_markers : f->n_muscles;
+        const double n_estimates = s->tally.n_solves;
+        double squares = 0, present = 0, left_out = 0;
+        for (int32_t pass = 0; pass < 2; pass++) {
+            for (int32_t i = 0; i < n; i++) {
+                const mhi_channel_tally t = kind == 0 ? mhi_diagnosis_marker(s->diagnosis, i)
+                                                      : mhi_diagnosis_muscle(s->diagnosis, i);
+                if (pass == 0) {
+                    squares += t.present > 0 ? t.present * t.rms * t.rms : 0;
+                    present += t.present;
+                    left_out += t.left_out;
+                } else {
+                    add_channel(channels, kind == 0 ? "marker " : "emg ",
+                                kind == 0 ? f->marker_names[i] : f->muscle_names[i],
+                                t.present / n_estimates, t.rms, t.left_out / n_estimates);
+                }
+            }
+            if (pass == 0 && n > 0) {
+                add_channel(channels, "", kind == 0 ? "markers" : "emg", present / n / n_estimates,
+                            present > 0 ? sqrt(squares / present) : NAN,
+                            left_out / n / n_estimates);
+            }
+        }
+    }
+}
+
 mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error *err) {
     tally_sort(&s->tally);
     cJSON *root = cJSON_CreateObject();
@@ -139,6 +207,8 @@ mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error
     if (s->has_rmse) {
         add_rmse(root, &s->rmse);
     }
+    add_verdict(root, s);
+    add_channels(root, s);
     char *text = cJSON_Print(root);
     cJSON_Delete(root);
     if (text == NULL) {
@@ -147,6 +217,27 @@ mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error
     mhi_text_add(out, "%s\n", text);
     cJSON_free(text);
     return MHE_OK;
+}
+
+void summary_verdict(const summary *s, mhi_text *out) {
+    const int32_t weight = mhi_findings_weight(s->findings);
+    mhi_text_add(out, "usable: %s\n", mhi_usable(weight));
+    for (int32_t level = MHI_FINDING_USELESS; level >= MHI_FINDING_NOTE; level--) {
+        for (int32_t i = 0; i < s->findings->n; i++) {
+            const mhi_finding *f = &s->findings->all[i];
+            if (f->weight == level) {
+                mhi_text_add(out, "  %s: %s\n", weight_name(level), f->text);
+                if (*mhi_finding_remedy(f) != '\0') {
+                    mhi_text_add(out, "    try: %s\n", mhi_finding_remedy(f));
+                }
+            }
+        }
+    }
+    if (s->model->n_unsupported > 0) {
+        mhi_text_add(out, "left out of the model: %d element%s (summary.json: dropped), first %s\n",
+                     s->model->n_unsupported, s->model->n_unsupported == 1 ? "" : "s",
+                     s->model->unsupported[0]);
+    }
 }
 
 void summary_lines(const summary *s, mhi_text *out) {

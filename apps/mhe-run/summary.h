@@ -3,6 +3,7 @@
 #ifndef SUMMARY_H
 #define SUMMARY_H
 
+#include "believe/diagnosis.h"
 #include "config/run.h"
 #include "estimator/errors.h"
 #include "live.h"
@@ -18,11 +19,16 @@ typedef struct summary {
     const char *alignment; /* a line, or NULL */
     int32_t has_rmse;
     mhi_rmse rmse;
-    const live *live; /* NULL: not by the clock */
+    const mhi_findings *findings;   /* what the verdict follows from */
+    const mhi_diagnosis *diagnosis; /* what was tracked */
+    const mhe_description *model;   /* what of it was dropped */
+    const live *live;               /* NULL: not by the clock */
 } summary;
 
 /* summary.json; sorts the solve times. */
 mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error *err);
+/* The verdict first: usable or not, why, and what helps. */
+void summary_verdict(const summary *s, mhi_text *out);
 /* Plain lines for the terminal, after summary_json. */
 void summary_lines(const summary *s, mhi_text *out);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "track.h"
 
+#include "believe/believe.h"
 #include "believe/diagnosis.h"
 #include "estimator/create.h"
 #include "interrupt.h"
@@ -69,6 +70,19 @@ static void tell_stale(const tracking *t) {
     mhe_free(names);
 }
 
+/* What the recording and the model say of each other; warnings of it, too. */
+static mhe_status believe(tracking *t, const mhi_system *system, mhe_error *err) {
+    const track_setup *s = t->setup;
+    mhi_findings *findings = &t->recording->findings;
+    const int32_t told = findings->n;
+    mhe_status status = mhi_believe_model(s->run, system, t->recording, findings, err);
+    if (status == MHE_OK) {
+        status = mhi_believe_fit(s->run, system, t->recording, findings, err);
+    }
+    mhi_findings_tell(findings, told, s->host);
+    return status;
+}
+
 static mhe_status open_all(tracking *t, mhe_error *err) {
     const track_setup *s = t->setup;
     if (s->realtime && !s->check_only) {
@@ -86,6 +100,9 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
     mhe_estimator_describe(t->estimator, &t->summary.info);
     status =
         mhi_recording_read(s->run, mhi_system_description(system), s->host, &t->recording, err);
+    if (status == MHE_OK) {
+        status = believe(t, system, err);
+    }
     if (status == MHE_OK && t->recording->reference.present) {
         mhi_estimator_set_start(t->estimator, t->recording->reference.q,
                                 t->recording->reference.qdot);
@@ -98,8 +115,8 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
         t->summary.n_frames = t->recording->n_frames;
         t->summary.emg = t->recording->emg_report;
         t->summary.alignment = t->recording->alignment;
-        status =
-            mhi_diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis, err);
+        status = mhi_diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis,
+                                      err);
     }
     if (status == MHE_OK && !s->check_only) {
         status = results_open(t->outbox, &t->summary.info, t->recording, &s->run->output.formats,
@@ -175,6 +192,10 @@ static mhe_status write_texts(tracking *t, mhe_error *err) {
         mhi_errors_rmse(t->errors, run->output.skip_first, run->output.skip_last, &t->summary.rmse);
     }
     mhe_estimator_describe(t->estimator, &t->summary.info); /* the interval is known now */
+    mhi_diagnosis_judge(t->diagnosis, &t->recording->findings);
+    t->summary.findings = &t->recording->findings;
+    t->summary.diagnosis = t->diagnosis;
+    t->summary.model = mhi_system_description(mhi_estimator_system(t->estimator));
     mhi_run_write(run, &text);
     mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                                     : mhe_outbox_text(t->outbox, "config.yaml", text.data, err);
@@ -205,6 +226,7 @@ static void draw(tracking *t) {
 static void tell(const tracking *t) {
     mhi_text text = {0};
     mhe_error why = {0};
+    summary_verdict(&t->summary, &text);
     summary_lines(&t->summary, &text);
     mhi_diagnosis_lines(t->diagnosis, &text);
     if (!text.failed) {

@@ -169,6 +169,44 @@ read_right scaled 0.005
 config no-turn hinge.bioMod 'markers: good.trc, transform: {rotate: w90}'
 refused no-turn "no-turn.yaml:2: data.transform: 'rotate' is an axis and degrees"
 
+# What cannot be meant so: named, with a remedy that is a key and that helps.
+# verdict NAME yes|doubtful|no 'TEXT'...: what the run says of itself on the terminal
+verdict() {
+    name=$1 usable=$2
+    shift 2
+    count=$((count + 1))
+    "$run" "$name.yaml" --out "out/$name" --quiet > "$name.txt" 2> "$name.err" < /dev/null || fail "$name: $(cat "$name.err")"
+    grep -qx "usable: $usable" "$name.txt" || fail "$name: not '$usable': $(cat "$name.txt")"
+    grep -q "\"usable\":[[:space:]]*\"$usable\"" "out/$name/summary.json" || fail "$name: summary.json does not say $usable"
+    for text in "$@"; do
+        grep -qF -- "$text" "$name.txt" || fail "$name: no '$text' in: $(cat "$name.txt")"
+    done
+}
+# remedied NAME KEYS: with them the same files give the right angle
+remedied() {
+    sed "s/^data: {\(.*\)}$/data: {\1, $2}/" "$1.yaml" > "$1-right.yaml"
+    read_right "$1-right" 0.005
+    grep -qx 'usable: yes' "$1-right.txt" || fail "$1: still not usable: $(cat "$1-right.txt")"
+}
+verdict good yes
+config z-up hinge.bioMod 'markers: z-up.trc'
+trc 100 'for (i = 1; i <= 7; i += 3) {y = c[i + 1]; c[i + 1] = -c[i + 2]; c[i + 2] = y}' > z-up.trc
+verdict z-up no "its vertical does not fit the model's gravity" 'try: data.transform: {rotate: x-90}'
+remedied z-up 'transform: {rotate: x-90}'
+config origin hinge.bioMod 'markers: origin.trc'
+trc 100 'for (i = 1; i <= 7; i += 3) {c[i] += 300; c[i + 1] += 150; c[i + 2] -= 200}' > origin.trc
+verdict origin no 'all markers are off by the same 0.300 0.150 -0.200 m' 'data.transform: {shift: [-0.300, -0.150, 0.200]}'
+remedied origin 'transform: {shift: [-0.300, -0.150, 0.200]}'
+config glass hinge.bioMod 'markers: glass.trc'
+trc 100 'c[1] = -c[1]; c[4] = -c[4]; c[7] = -c[7]' > glass.trc
+verdict glass no 'those of a mirrored body' 'scale: -1}'
+config degrees hinge.bioMod 'angles: degrees.mot' 'q, sigma: 0.005'
+mot 'version=1' $deg > degrees.mot
+refused degrees "degrees.mot:4: 'fore_RotZ' goes from 28.6" "'inDegrees=yes' in the header"
+config still hinge.bioMod 'markers: still.trc'
+trc 100 'if (k > 20) for (i = 1; i <= 3; i++) c[i] = held[i]; else for (i = 1; i <= 3; i++) held[i] = c[i]' > still.trc
+verdict still doubtful 'repeat to the last digit: ELB.L'
+
 # Rows, gaps, times, units.
 config zeros hinge.bioMod 'markers: zeros.trc'
 trc 100 'if (k < 20) for (i = 1; i <= 6; i++) c[i] = 0' > zeros.trc
@@ -239,6 +277,14 @@ if [ -d "$shared" ]; then
     read_right dup-marker 0.005 "dup-marker.bioMod:22: marker 'ELB.L' is there twice"
     read_right latin1-osim 0.005 'latin1-osim.osim:3: bytes that are no UTF-8'
     read_right label-dots 0.005 'ELB_L as ELB.L'
+    verdict good yes
+    verdict lab-z-up no "its vertical does not fit the model's gravity" 'try: data.transform: {rotate: x-90}'
+    remedied lab-z-up 'transform: {rotate: x-90}'
+    verdict lab-origin no 'all markers are off by the same 0.300 0.150 -0.200 m' 'data.transform: {shift: [-0.300, -0.150, 0.200]}'
+    remedied lab-origin 'transform: {shift: [-0.3, -0.15, 0.2]}'
+    verdict left-handed-joint no 'mirrored'
+    refused degrees-unsaid "degrees-unsaid.mot:7: 'flex' goes from 28.6" 'its range is -0.2 to 2.6 rad' 'inDegrees=yes'
+    refused emg-percent 'emg-percent.sto: values from' 'percent?'
     refused two-subjects 'two subjects (A, B) have marker ELB.L'
     refused fatigue "fatigue.bioMod:35: fatigueparameters of muscle 'FLEX'"
     sed -i 's/file: fatigue.bioMod/file: fatigue.bioMod, unsupported: warn/' fatigue.yaml

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "believe/diagnosis.h"
+#include "believe/diagnosis_private.h"
 
-#include "base/arena.h"
 #include "believe/exchange.h"
 
 #include <math.h>
@@ -12,30 +11,11 @@
 #define FAR 0.03         /* m: a marker this far off is worth a word */
 #define EXCHANGED 0.04   /* m: two markers this far off may be exchanged ... */
 #define FITS_BETTER 0.25 /* ... if their squares shrink to this share when they are */
+#define AT_END 1e-3      /* share of a coordinate's range */
 #define AT_BOUND 0.999   /* share of the largest activation */
 #define OFTEN 0.1        /* share of estimates */
 #define LARGE_TORQUE 0.5 /* residual torque over the muscles' moment, RMS */
 #define DISAGREES 0.15   /* RMS difference of EMG and estimate */
-
-/* Sums over the estimates. */
-typedef struct tally {
-    double squares, most;
-    int32_t n, missing;
-} tally;
-
-struct mhi_diagnosis {
-    const mhe_estimator_info *info;
-    const mhi_run *run;
-    const mhi_recording *recording;
-    const mhi_system *system;
-    int32_t frame; /* of the recording, of the last estimate */
-    int32_t n, n_seen, n_wanted;
-    double *distance, *emg;
-    tally *markers, *muscles, *torques, *moments;
-    int32_t *at_bound;             /* [n_muscles] */
-    int32_t *exchanged, *compared; /* [n_markers x n_markers], of pairs i < j */
-    mhi_arena arena;
-};
 
 mhe_status mhi_diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
                                 const mhi_recording *recording, const mhi_system *system,
@@ -53,16 +33,17 @@ mhe_status mhi_diagnosis_create(const mhe_estimator_info *info, const mhi_run *r
     d->system = system;
     d->distance = MHI_TAKE(&arena, double, n_k);
     d->emg = MHI_TAKE(&arena, double, info->n_muscles);
-    d->markers = MHI_TAKE(&arena, tally, n_k);
-    d->muscles = MHI_TAKE(&arena, tally, info->n_muscles);
-    d->torques = MHI_TAKE(&arena, tally, info->n_q);
-    d->moments = MHI_TAKE(&arena, tally, info->n_q);
+    d->markers = MHI_TAKE(&arena, mhi_tally, n_k);
+    d->muscles = MHI_TAKE(&arena, mhi_tally, info->n_muscles);
+    d->torques = MHI_TAKE(&arena, mhi_tally, info->n_q);
+    d->moments = MHI_TAKE(&arena, mhi_tally, info->n_q);
     d->at_bound = MHI_TAKE(&arena, int32_t, info->n_muscles);
+    d->at_end = MHI_TAKE(&arena, int32_t, info->n_q);
     d->exchanged = MHI_TAKE(&arena, int32_t, n_k * n_k);
     d->compared = MHI_TAKE(&arena, int32_t, n_k * n_k);
     d->arena = arena;
     if (!d->distance || !d->emg || !d->markers || !d->muscles || !d->torques || !d->moments ||
-        !d->at_bound || !d->exchanged || !d->compared) {
+        !d->at_bound || !d->at_end || !d->exchanged || !d->compared) {
         mhi_diagnosis_free(d);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
@@ -77,7 +58,7 @@ void mhi_diagnosis_free(mhi_diagnosis *d) {
     }
 }
 
-static void count(tally *t, double value) {
+static void count(mhi_tally *t, double value) {
     if (isnan(value)) {
         t->missing++;
         return;
@@ -85,10 +66,6 @@ static void count(tally *t, double value) {
     t->squares += value * value;
     t->most = fmax(t->most, fabs(value));
     t->n++;
-}
-
-static double rms(const tally *t) {
-    return t->n == 0 ? 0 : sqrt(t->squares / t->n);
 }
 
 static double apart2(const double *a, const double *b) {
@@ -122,6 +99,21 @@ static void add_markers(mhi_diagnosis *d, const double *measured, const double *
     }
 }
 
+/* What the estimator did not believe of markers and EMG. */
+static void add_left_out(mhi_diagnosis *d, const mhe_estimate *e) {
+    for (int32_t i = 0; i < e->n_tracked; i++) {
+        const mhe_tracked *t = mhe_tracked_at(e, i);
+        const mhe_channel *c = mhe_channel_at(d->info, t->channel);
+        mhi_tally *of = strcmp(c->name, "markers") == 0 ? d->markers
+                        : strcmp(c->name, "emg") == 0   ? d->muscles
+                                                        : NULL;
+        for (int32_t k = 0; k < c->n_labels && of != NULL; k++) {
+            const int32_t why = t->why[k * c->per_label];
+            of[k].left_out += why == MHE_TRACK_FAR || why == MHE_TRACK_SATURATED;
+        }
+    }
+}
+
 void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     const mhe_estimator_info *f = d->info;
     const mhi_recording *r = d->recording;
@@ -131,6 +123,9 @@ void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     }
     const ptrdiff_t k = d->frame, late = k - d->run->data.emg_delay;
     d->n++;
+    d->n_converged += e->status == MHE_FRAME_OK;
+    d->n_predicted += e->status == MHE_FRAME_PREDICTED;
+    add_left_out(d, e);
     add_markers(d, r->markers == NULL ? NULL : r->markers + k * 3 * f->n_markers, e->markers);
     const double *control = e->excitation != NULL ? e->excitation : e->activation;
     const double most =
@@ -143,6 +138,9 @@ void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     for (int32_t i = 0; i < f->n_q; i++) {
         count(&d->moments[i], e->moment[i]);
         count(&d->torques[i], i < f->n_residual_torques ? e->residual[i] : 0);
+        const mhe_coordinate *c = &mhi_system_description(d->system)->coordinates[i];
+        const double near = AT_END * (c->upper - c->lower);
+        d->at_end[i] += e->q[i] < c->lower + near || e->q[i] > c->upper - near;
     }
 }
 
@@ -155,14 +153,14 @@ const double *mhi_diagnosis_emg(const mhi_diagnosis *d) {
 }
 
 /* Up to NAMED of n tallies above `least`, the largest RMS first; their number. */
-static int32_t worst(const tally *all, int32_t n, double least, int32_t *which) {
+static int32_t worst(const mhi_tally *all, int32_t n, double least, int32_t *which) {
     int32_t found = 0;
     for (int32_t i = 0; i < n; i++) {
-        if (rms(&all[i]) <= least) {
+        if (mhi_tally_rms(&all[i]) <= least) {
             continue;
         }
         int32_t at = found < NAMED ? found++ : NAMED;
-        while (at > 0 && rms(&all[i]) > rms(&all[which[at - 1]])) {
+        while (at > 0 && mhi_tally_rms(&all[i]) > mhi_tally_rms(&all[which[at - 1]])) {
             if (at < NAMED) {
                 which[at] = which[at - 1];
             }
@@ -183,7 +181,7 @@ static int32_t add_exchanges_of_all(const mhi_diagnosis *d, mhi_text *out) {
     uint8_t *suspect = calloc((size_t)f->n_markers + 1, 1);
     int32_t n = 0;
     for (int32_t i = 0; i < f->n_markers && suspect != NULL; i++) {
-        suspect[i] = rms(&d->markers[i]) > FAR;
+        suspect[i] = mhi_tally_rms(&d->markers[i]) > FAR;
         n += suspect[i];
     }
     n = n == 0 ? 0 : mhi_exchange_find(d->system, d->recording, suspect, pairs, NAMED);
@@ -227,11 +225,11 @@ static void marker_lines(const mhi_diagnosis *d, mhi_text *out) {
                  100.0 * (d->n_wanted - d->n_seen) / d->n_wanted);
     for (int32_t i = 0; i < n; i++) {
         mhi_text_add(out, "%s %s %.1f mm", i == 0 ? "" : ",", f->marker_names[which[i]],
-                     1e3 * rms(&d->markers[which[i]]));
+                     1e3 * mhi_tally_rms(&d->markers[which[i]]));
     }
     mhi_text_add(out, "\n");
     exchange_lines(d, out);
-    if (rms(&d->markers[which[0]]) > FAR) {
+    if (mhi_tally_rms(&d->markers[which[0]]) > FAR) {
         mhi_text_add(out,
                      "try: check the place of %s on the model and the model's scale; let "
                      "outliers pull less with 'huber' of the marker cost\n",
@@ -241,7 +239,7 @@ static void marker_lines(const mhi_diagnosis *d, mhi_text *out) {
 
 /* How well the muscles follow their EMG, over all that have one. */
 static void emg_line(const mhi_diagnosis *d, mhi_text *out) {
-    tally all = {0};
+    mhi_tally all = {0};
     int32_t which[NAMED], n_with = 0;
     for (int32_t i = 0; i < d->info->n_muscles; i++) {
         all.squares += d->muscles[i].squares;
@@ -249,9 +247,10 @@ static void emg_line(const mhi_diagnosis *d, mhi_text *out) {
         n_with += d->muscles[i].n > 0;
     }
     if (worst(d->muscles, d->info->n_muscles, 0, which) > 0) {
-        mhi_text_add(
-            out, "EMG and estimate are %.3f apart (RMS, of 1; %d muscles); most: %s %.3f\n",
-            rms(&all), n_with, d->info->muscle_names[which[0]], rms(&d->muscles[which[0]]));
+        mhi_text_add(out,
+                     "EMG and estimate are %.3f apart (RMS, of 1; %d muscles); most: %s %.3f\n",
+                     mhi_tally_rms(&all), n_with, d->info->muscle_names[which[0]],
+                     mhi_tally_rms(&d->muscles[which[0]]));
     }
 }
 
@@ -273,7 +272,7 @@ static void muscle_lines(const mhi_diagnosis *d, mhi_text *out) {
     n = worst(d->muscles, f->n_muscles, DISAGREES, which);
     for (int32_t i = 0; i < n; i++) {
         mhi_text_add(out, "%s %s %.2f", i == 0 ? "EMG and estimate disagree (RMS, of 1):" : ",",
-                     f->muscle_names[which[i]], rms(&d->muscles[which[i]]));
+                     f->muscle_names[which[i]], mhi_tally_rms(&d->muscles[which[i]]));
     }
     if (n > 0) {
         mhi_text_add(out, "\ntry: check electrode, MVC value and mapping of these channels, or "
@@ -285,7 +284,7 @@ static void torque_lines(const mhi_diagnosis *d, mhi_text *out) {
     const mhe_estimator_info *f = d->info;
     int32_t n = 0;
     for (int32_t i = 0; i < f->n_q; i++) {
-        const double torque = rms(&d->torques[i]), moment = rms(&d->moments[i]);
+        const double torque = mhi_tally_rms(&d->torques[i]), moment = mhi_tally_rms(&d->moments[i]);
         if (torque > 1 && torque > LARGE_TORQUE * moment) {
             mhi_text_add(out, "%s %s %.1f N m (muscles %.1f)",
                          n++ == 0 ? "large residual torques (RMS):" : ",", f->coordinate_names[i],

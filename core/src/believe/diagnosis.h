@@ -4,6 +4,7 @@
 #define MHI_DIAGNOSIS_H
 
 #include "base/text.h"
+#include "believe/findings.h"
 #include "estimator/recording.h"
 #include "model/system.h"
 
@@ -23,6 +24,17 @@ void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *estimate);
 const double *mhi_diagnosis_distances(const mhi_diagnosis *d);
 /* EMG that the last estimate's controls were to follow [n_muscles]; NaN: none. */
 const double *mhi_diagnosis_emg(const mhi_diagnosis *d);
+
+/* What of the run makes it doubtful, added to `findings`. [cold] */
+void mhi_diagnosis_judge(const mhi_diagnosis *d, mhi_findings *findings);
+/* Of marker or muscle i: samples that were there, RMS distance (m, or of 1), samples not believed.
+ */
+typedef struct mhi_channel_tally {
+    int32_t present, left_out;
+    double rms;
+} mhi_channel_tally;
+mhi_channel_tally mhi_diagnosis_marker(const mhi_diagnosis *d, int32_t i);
+mhi_channel_tally mhi_diagnosis_muscle(const mhi_diagnosis *d, int32_t i);
 
 /* One finding a line, the most important first; "try: " begins what may help. */
 void mhi_diagnosis_lines(const mhi_diagnosis *d, mhi_text *out);

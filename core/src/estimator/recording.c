@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/recording_private.h"
 
+#include "believe/believe.h"
 #include "estimator/marker_unit.h"
 #include "io/motion_file.h"
 
@@ -53,7 +54,7 @@ static void to_radians(double *values, int32_t n_frames, const mhe_description *
 
 /* Measured joint angles; without markers their times are the frames'. */
 static mhe_status read_angles(mhi_recording *r, const mhi_run *run, const mhe_description *d,
-                              const mhe_host *host, mhe_error *err) {
+                              const mhe_host *host, const mhe_host *told, mhe_error *err) {
     static const mhi_naming naming = {"coordinate", {"%s", "q_%s"}, 1};
     mhi_table *table = NULL;
     mhe_status status = mhi_sto_read(run->data.angles, &table, err);
@@ -76,6 +77,12 @@ static mhe_status read_angles(mhi_recording *r, const mhi_run *run, const mhe_de
     }
     if (status == MHE_OK && table->in_degrees) {
         to_radians(r->angles, r->n_frames, d);
+    }
+    if (status == MHE_OK) {
+        const mhi_angles_source source = {table->path, table->line, table->in_degrees};
+        const int32_t from = r->findings.n;
+        status = mhi_believe_angles(d, r, &source, &r->findings, err);
+        mhi_findings_tell(&r->findings, from, told);
     }
     free(names);
     mhi_table_free(table);
@@ -160,7 +167,23 @@ mhe_status mhi_recording_read_reference(const char *path, const mhe_description 
     return MHE_OK;
 }
 
-mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, const mhe_host *host,
+/* A host that also notes what it is told: all that is left out of a recording stands in its
+ * findings. */
+typedef struct noting_host {
+    mhe_host host;
+    const mhe_host *told;
+    mhi_findings *findings;
+} noting_host;
+
+static void note_line(const mhe_host *host, int32_t level, const char *text) {
+    const noting_host *own = (const noting_host *)(const void *)host;
+    if (level <= MHE_LOG_WARNING) {
+        mhi_findings_add(own->findings, MHI_FINDING_NOTE, "", "%s", text);
+    }
+    own->told->log(own->told, level, text);
+}
+
+mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, const mhe_host *told,
                               mhi_recording **recording, mhe_error *err) {
     *recording = NULL;
     const mhi_data_section *data = &run->data;
@@ -177,16 +200,28 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     if (r == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
+    noting_host noting = {*told, told, &r->findings};
+    noting.host.log = note_line;
+    const mhe_host *host = &noting.host;
+    int32_t told_from = 0;
     mhe_status status = MHE_OK;
     if (run->data.markers != NULL) {
         status = read_markers(r, run, d, host, err);
     }
     r->n_q = d->n_coordinates;
     if (status == MHE_OK && data->angles != NULL) {
-        status = read_angles(r, run, d, host, err);
+        status = read_angles(r, run, d, host, told, err);
     }
     if (status == MHE_OK && run->data.emg != NULL) {
         status = mhi_recording_read_emg(r, run, d, host, err);
+    }
+    if (status == MHE_OK) {
+        told_from = r->findings.n;
+        status = mhi_believe_emg(run, d, r, &r->findings, err);
+    }
+    if (status == MHE_OK) {
+        mhi_believe_markers(run, d, r, &r->findings);
+        mhi_findings_tell(&r->findings, told_from, told);
     }
     if (status == MHE_OK && run->data.reference != NULL) {
         status = read_reference(r, run->data.reference, d, host, err);
@@ -234,5 +269,6 @@ void mhi_recording_free(mhi_recording *r) {
     free(r->reference.excitation);
     free(r->reference.force);
     free(r->labels_used);
+    mhi_findings_free(&r->findings);
     free(r);
 }

@@ -4,6 +4,7 @@
 #ifndef MHI_RECORDING_H
 #define MHI_RECORDING_H
 
+#include "believe/findings.h"
 #include "config/run.h"
 #include "emg/electrodes.h"
 
@@ -37,7 +38,8 @@ typedef struct mhi_recording {
     mhi_emg_report emg_report;
     char alignment[512]; /* rates and offsets of the sources in a line, where EMG was processed */
     mhi_reference reference;
-    uint8_t *labels_used; /* [data.labels]; NULL: none was looked for */
+    mhi_findings findings; /* what makes it doubtful (believe/believe.h) */
+    uint8_t *labels_used;  /* [data.labels]; NULL: none was looked for */
 } mhi_recording;
 
 /* Reads the files that run->data names for a model. Columns that match nothing, and names

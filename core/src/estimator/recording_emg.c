@@ -6,23 +6,6 @@
 #include <math.h>
 #include <stdlib.h>
 
-/* Raw or in percent; some way above 1 is common in fast motions. */
-static void warn_not_normalised(const mhi_recording *r, int32_t n_muscles, const char *path,
-                                const mhe_host *host) {
-    double least = 0, most = 0;
-    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * n_muscles; i++) {
-        least = fmin(least, r->emg[i]); /* of a number and NaN: the number */
-        most = fmax(most, r->emg[i]);
-    }
-    if (least < -0.05 || most > 2) {
-        char line[512];
-        (void)snprintf(line, sizeof line,
-                       "%.400s: values from %.4g to %.4g; EMG normalised to 0..1 is needed", path,
-                       least, most);
-        host->log(host, MHE_LOG_WARNING, line);
-    }
-}
-
 /* Without markers, frames at a rate of their own over the time of the EMG. */
 static mhe_status set_grid(mhi_recording *r, const mhi_run *run, const mhi_table *table,
                            mhe_error *err) {
@@ -92,9 +75,6 @@ static mhe_status read_muscles(mhi_recording *r, const mhi_run *run, const mhe_d
     if (status == MHE_OK) {
         status = mhi_recording_columns(r, table, &naming, names, d->n_muscles, 1, 0, &r->emg,
                                        &r->n_emg_found, host, err);
-    }
-    if (status == MHE_OK) {
-        warn_not_normalised(r, d->n_muscles, table->path, host);
     }
     free(names);
     return status;

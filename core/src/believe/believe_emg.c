@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "base/text.h"
+#include "believe/believe.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define BEYOND 2.0      /* of the MVC: fast motions reach 1.5 */
+#define BELOW (-0.05)   /* a filter may swing below 0 */
+#define RAW_SHARE 0.1   /* of the samples are below 0: an alternating signal */
+#define OFTEN 0.002     /* share of samples above BEYOND that is no slip */
+#define QUIET 0.02      /* no muscle reaches 2 % of its MVC */
+#define OWN_PEAK 1e-6   /* a maximum of exactly 1 ... */
+#define OWN_PEAKS 3     /* ... in so many channels and in most of them */
+#define WHOLE 0.9       /* share of frames with EMG that is all but a filter's run-in */
+#define FLAT 0.3        /* s of one and the same value */
+#define FLAT_SHARE 0.02 /* of the recording */
+
+typedef struct channel {
+    double low, high;
+    int32_t n, n_below, n_beyond, n_flat;
+} channel;
+
+static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
+    channel c = {INFINITY, -INFINITY, 0, 0, 0, 0};
+    int32_t run = 0;
+    double last = NAN;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        const double value = r->emg[(ptrdiff_t)k * n_m + muscle];
+        if (isnan(value)) {
+            last = value;
+            run = 0;
+            continue;
+        }
+        run = value == last ? run + 1 : 0;
+        c.n_flat += run > FLAT * r->rate;
+        last = value;
+        c.low = fmin(c.low, value);
+        c.high = fmax(c.high, value);
+        c.n++;
+        c.n_below += value < BELOW;
+        c.n_beyond += value > BEYOND;
+    }
+    return c;
+}
+
+static void add_name(mhi_text *list, const char *name) {
+    mhi_text_add(list, "%s%s", list->length == 0 ? "" : ", ", name);
+}
+
+/* What cannot be normalised EMG at all. */
+static mhe_status check_scale(const char *path, const channel *all, int32_t n, mhe_error *err) {
+    double n_samples = 0, n_below = 0, n_beyond = 0, low = INFINITY, high = -INFINITY;
+    for (int32_t i = 0; i < n; i++) {
+        n_samples += all[i].n;
+        n_below += all[i].n_below;
+        n_beyond += all[i].n_beyond;
+        low = fmin(low, all[i].low);
+        high = fmax(high, all[i].high);
+    }
+    if (n_samples > 0 && n_below > RAW_SHARE * n_samples) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s: values from %.4g to %.4g, %.0f %% of them below 0: is this raw EMG? "
+                        "Normalised EMG goes from 0 to 1; the section emg with channels makes it "
+                        "of raw",
+                        path, low, high, 100 * n_below / n_samples);
+    }
+    if (n_samples > 0 && n_beyond > OFTEN * n_samples) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s: values from %.4g to %.4g: %s Normalised EMG goes from 0 to 1", path,
+                        low, high,
+                        high <= 300 ? "percent? Divide them by 100."
+                                    : "raw EMG? The section emg with channels makes shares of it.");
+    }
+    return MHE_OK;
+}
+
+/* One list of muscles a kind. */
+static void check_channels(const char *path, const mhe_description *d, const mhi_recording *r,
+                           const channel *all, mhi_findings *findings) {
+    mhi_text flat = {0}, zero = {0}, own = {0}, below = {0};
+    int32_t n_own = 0, n_there = 0, n_quiet = 0;
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        const channel *c = &all[i];
+        if (c->n == 0) {
+            continue;
+        }
+        n_there++;
+        n_quiet += c->high < QUIET;
+        if (c->high == 0 && c->low == 0) {
+            add_name(&zero, d->muscles[i].name);
+        } else if (c->n_flat > FLAT_SHARE * r->n_frames) {
+            add_name(&flat, d->muscles[i].name);
+        }
+        if (c->n_below > OFTEN * c->n) {
+            add_name(&below, d->muscles[i].name);
+        }
+        if (fabs(c->high - 1) < OWN_PEAK) {
+            add_name(&own, d->muscles[i].name);
+            n_own++;
+        }
+    }
+    if (zero.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "leave these columns out if nothing was measured: an absent one is "
+                         "estimated, one of zeros is believed",
+                         "%s: nothing but zeros: %s", path, zero.data);
+    }
+    if (flat.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "was the electrode off? Write NaN where nothing was measured",
+                         "%s: the same value for more than %.1f s: %s", path, FLAT, flat.data);
+    }
+    if (below.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL, "normalised EMG goes from 0 to 1",
+                         "%s: values below 0: %s", path, below.data);
+    }
+    if (n_own >= OWN_PEAKS && 2 * n_own > n_there) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "EMG scaled to each channel's own peak says nothing of how strong a "
+                         "muscle was: divide by the MVC, or give it a larger sigma",
+                         "%s: the maximum is exactly 1 in %d of %d channels (%s)", path, n_own,
+                         n_there, own.data);
+    }
+    if (n_there > 1 && n_quiet == n_there) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "are these volts, or shares of another unit? Divide by the MVC",
+                         "%s: no muscle reaches %.0f %% of its MVC", path, 100 * QUIET);
+    }
+    mhi_text_free(&flat);
+    mhi_text_free(&zero);
+    mhi_text_free(&own);
+    mhi_text_free(&below);
+}
+
+/* EMG that is there for part of the frames: estimates with and without it differ. */
+static void check_overlap(const char *path, const mhi_recording *r, int32_t n_m,
+                          mhi_findings *findings) {
+    int32_t n = 0, first = -1, last = -1;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        int32_t there = 0;
+        for (int32_t i = 0; i < n_m && !there; i++) {
+            there = !isnan(r->emg[(ptrdiff_t)k * n_m + i]);
+        }
+        n += there;
+        first = there && first < 0 ? k : first;
+        last = there ? k : last;
+    }
+    if (n > 0 && n < WHOLE * r->n_frames && r->n_frames - n > 2) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "forces are those of EMG only there; data.emg_offset moves the EMG",
+                         "%s: EMG from %.4g to %.4g s, frames from %.4g to %.4g s: %.0f %% of the "
+                         "frames have EMG",
+                         path, r->time[first], r->time[last], r->time[0], r->time[r->n_frames - 1],
+                         100.0 * n / r->n_frames);
+    }
+}
+
+/* Which costs want EMG is known of those that say so in their id. */
+static int32_t wants_emg(const mhi_run *run) {
+    for (int32_t i = 0; i < run->n_costs; i++) {
+        if (strstr(run->costs[i].plugin->id, "emg") != NULL && run->costs[i].weight > 0) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const mhi_recording *r,
+                           mhi_findings *findings, mhe_error *err) {
+    if (r->emg == NULL) {
+        if (wants_emg(run)) {
+            mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                             "name the EMG in data.emg, or take mhe.cost.min-excitation",
+                             "%s: a cost tracks EMG, but data.emg is not given: forces are the "
+                             "smallest that the motion needs",
+                             run->path);
+        }
+        return MHE_OK;
+    }
+    const char *path = run->data.emg;
+    channel *all = calloc((size_t)d->n_muscles + 1, sizeof *all);
+    if (all == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        all[i] = look_at(r, d->n_muscles, i);
+    }
+    mhe_status status = MHE_OK;
+    if (run->emg.n_channels == 0) {
+        status = check_scale(path, all, d->n_muscles, err);
+    }
+    if (status == MHE_OK) {
+        check_channels(path, d, r, all, findings);
+        check_overlap(path, r, d->n_muscles, findings);
+    }
+    free(all);
+    return status;
+}

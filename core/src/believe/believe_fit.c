@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* believe_fit.c: one transform of all markers explains more than many misplaced ones. */
+#include "base/text.h"
+#include "believe/believe.h"
+#include "believe/pose.h"
+
+#include <math.h>
+#include <string.h>
+
+#define FAR 0.02        /* m RMS: further than skin and model make it; the whole search is done */
+#define GAIN 0.5        /* share of the distance that a transform must leave at most ... */
+#define WORTH 0.003     /* m by which it must be nearer at least */
+#define HOPELESS 0.05   /* m RMS: no posture is near */
+#define ROUNDS 40       /* of postures and transform by turns */
+#define NEARLY 1.25     /* times the best one's distance: the simplest of them is the remedy */
+#define SLIGHT_TURN 1.5 /* degrees */
+#define SLIGHT_SHIFT 0.004 /* m */
+#define SLIGHT_SCALE 0.02
+#define LYING 55.0 /* degrees from upright throughout */
+
+typedef struct trial {
+    mhi_pose pose;
+    double rms;
+    int32_t cost; /* how much it takes to write it down */
+} trial;
+
+/* The 24 turns by right angles, and those mirrored: number 0 is no turn. */
+static mhi_pose right_angles(int32_t number, int32_t mirrored) {
+    static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {2, 1, 0},
+                                     {1, 0, 2}, {1, 2, 0}, {2, 0, 1}};
+    mhi_pose p = mhi_pose_identity();
+    const int *order = orders[number / 4];
+    const int odd = number / 4 >= 1 && number / 4 <= 3;
+    const int signs = number % 4;
+    double sign[3] = {signs & 1 ? -1 : 1, signs & 2 ? -1 : 1, 1};
+    sign[2] = sign[0] * sign[1] * (odd ? -1 : 1) * (mirrored ? -1 : 1);
+    memset(p.turn, 0, sizeof p.turn);
+    for (int i = 0; i < 3; i++) {
+        p.turn[3 * i + order[i]] = sign[i];
+    }
+    return p;
+}
+
+static double determinant(const double r[9]) {
+    return r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6]) +
+           r[2] * (r[3] * r[7] - r[4] * r[6]);
+}
+
+/* Axis (unit) and degrees of the proper turn in a pose: of a mirror, of its negative. */
+static double axis_of(const mhi_pose *pose, double axis[3]) {
+    double r[9];
+    const double hand = determinant(pose->turn) < 0 ? -1 : 1;
+    for (int i = 0; i < 9; i++) {
+        r[i] = hand * pose->turn[i];
+    }
+    const double c = fmin(fmax((r[0] + r[4] + r[8] - 1) / 2, -1), 1);
+    const double v[3] = {r[7] - r[5], r[2] - r[6], r[3] - r[1]};
+    double size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    int largest = 0;
+    for (int i = 0; i < 3; i++) {
+        axis[i] = size > 1e-6 ? v[i] / size : (i == 2);
+        largest = r[4 * i] > r[4 * largest] ? i : largest;
+    }
+    if (size <= 1e-6 && c < 0) { /* half a turn: r = 2 a a' - 1 */
+        const double a = sqrt(fmax((r[4 * largest] + 1) / 2, 0));
+        for (int i = 0; i < 3; i++) {
+            axis[i] = i == largest ? a : r[3 * largest + i] / (2 * a);
+        }
+    }
+    return acos(c) * 180 / acos(-1);
+}
+
+/* "rotate: x-90, shift: [...]", as the config takes it; scale -1 mirrors. */
+static void write_transform(const mhi_pose *pose, mhi_text *out) {
+    double axis[3], degrees = axis_of(pose, axis);
+    const double hand = determinant(pose->turn) < 0 ? -1 : 1;
+    int along = -1, n = 0;
+    for (int i = 0; i < 3; i++) {
+        along = fabs(axis[i]) > 1 - 1e-4 ? i : along;
+    }
+    mhi_text_add(out, "data.transform: {");
+    if (degrees > SLIGHT_TURN && along >= 0) {
+        mhi_text_add(out, "rotate: %c%.4g", "xyz"[along], axis[along] < 0 ? -degrees : degrees);
+        n++;
+    } else if (degrees > SLIGHT_TURN) {
+        mhi_text_add(out, "rotate: [[%.6g, %.6g, %.6g], %.6g]", axis[0], axis[1], axis[2], degrees);
+        n++;
+    }
+    const double *s = pose->shift;
+    if (sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) > SLIGHT_SHIFT) {
+        mhi_text_add(out, "%sshift: [%.3f, %.3f, %.3f]", n++ > 0 ? ", " : "", s[0], s[1], s[2]);
+    }
+    if (hand < 0 || fabs(pose->scale - 1) > SLIGHT_SCALE) {
+        mhi_text_add(out, "%sscale: %.4g", n > 0 ? ", " : "", hand * pose->scale);
+    }
+    mhi_text_add(out, "}");
+}
+
+static int32_t is_slight(const mhi_pose *pose) {
+    double axis[3];
+    const double *s = pose->shift;
+    return determinant(pose->turn) > 0 && axis_of(pose, axis) < SLIGHT_TURN &&
+           sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]) < SLIGHT_SHIFT &&
+           fabs(pose->scale - 1) < SLIGHT_SCALE;
+}
+
+/* Keeps the better one, or where they are as good the simpler one. */
+static void consider(trial *best, const mhi_pose *pose, double rms, int32_t cost) {
+    const int better = rms < best->rms / NEARLY - 1e-4;
+    const int simpler = rms < best->rms * NEARLY + 1e-4 && cost < best->cost;
+    if (!isnan(rms) && (better || simpler || (cost == best->cost && rms < best->rms))) {
+        *best = (trial){*pose, rms, cost};
+    }
+}
+
+/* A turn, shift or scale that is near to none. */
+static void try_near(mhi_pose_search *s, trial *best) {
+    static const struct {
+        int32_t freedom, cost;
+    } ways[] = {{MHI_POSE_SHIFT, 2}, {MHI_POSE_TURN, 2}, {MHI_POSE_TURN | MHI_POSE_SHIFT, 4}};
+    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+        mhi_pose pose = mhi_pose_identity();
+        (void)mhi_pose_fit(s, &pose, 1);
+        const double rms = mhi_pose_adjust(s, ways[i].freedom, ROUNDS, &pose);
+        consider(best, &pose, rms, ways[i].cost);
+    }
+}
+
+/* Other axes, other hands, each with and without a shift. */
+static void try_axes(mhi_pose_search *s, trial *best) {
+    for (int32_t mirrored = 0; mirrored < 2; mirrored++) {
+        for (int32_t number = 0; number < 24; number++) {
+            mhi_pose pose = right_angles(number, mirrored);
+            double axis[3];
+            const double degrees = axis_of(&pose, axis);
+            const int about_x = fabs(axis[0]) > 0.99 && degrees < 100;
+            const int32_t cost = 1 + 4 * mirrored + (about_x || degrees < 1 ? 0 : 1);
+            double rms = mhi_pose_fit(s, &pose, 1);
+            consider(best, &pose, rms, cost);
+            rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, 6, &pose);
+            consider(best, &pose, rms, cost + 2);
+            if (rms < 2 * best->rms) {
+                rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, ROUNDS, &pose);
+                consider(best, &pose, rms, cost + 2);
+            }
+        }
+    }
+    mhi_pose pose = best->pose;
+    (void)mhi_pose_fit(s, &pose, 1);
+    double rms = mhi_pose_adjust(s, MHI_POSE_TURN | MHI_POSE_SHIFT, ROUNDS, &pose);
+    consider(best, &pose, rms, 6);
+    rms = mhi_pose_adjust(s, MHI_POSE_TURN | MHI_POSE_SHIFT | MHI_POSE_SCALE, ROUNDS, &pose);
+    consider(best, &pose, rms, 8);
+}
+
+static void tell_transform(const char *path, const trial *best, double as_is,
+                           mhi_findings *findings) {
+    const int32_t weight = as_is > HOPELESS ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL;
+    const double *t = best->pose.shift;
+    double axis[3];
+    const double degrees = axis_of(&best->pose, axis);
+    mhi_text how = {0};
+    write_transform(&best->pose, &how);
+    if (determinant(best->pose.turn) < 0) {
+        mhi_findings_add(findings, weight, "",
+                         "%s: the markers are those of a mirrored body: %.1f mm from the nearest "
+                         "posture (RMS), %.1f mm if they are mirrored back",
+                         path, 1e3 * as_is, 1e3 * best->rms);
+    } else if (degrees < SLIGHT_TURN && fabs(best->pose.scale - 1) < SLIGHT_SCALE) {
+        mhi_findings_add(findings, weight, "",
+                         "%s: all markers are off by the same %.3f %.3f %.3f m: %.1f mm from the "
+                         "nearest posture (RMS), %.1f mm without (another origin?)",
+                         path, -t[0], -t[1], -t[2], 1e3 * as_is, 1e3 * best->rms);
+    } else {
+        mhi_findings_add(findings, weight, "",
+                         "%s: the markers are in another frame than the model%s: %.1f mm from the "
+                         "nearest posture (RMS), %.1f mm if they are turned by %.4g degrees",
+                         path,
+                         degrees > 45 ? ", its vertical does not fit the model's gravity" : "",
+                         1e3 * as_is, 1e3 * best->rms, degrees);
+    }
+    mhi_findings_advise(findings, "%s", how.data == NULL ? "" : how.data);
+    mhi_text_free(&how);
+}
+
+/* A body that floats fits in any direction; then gravity tells which way is up. */
+static void check_upright(mhi_pose_search *s, const char *path, double as_is,
+                          mhi_findings *findings) {
+    mhi_pose turned = right_angles(7, 0);
+    const mhi_pose identity = mhi_pose_identity();
+    const double other = mhi_pose_fit(s, &turned, 1);
+    if (!(other < as_is * NEARLY + WORTH) || !(mhi_pose_tilt(s, &identity) > LYING)) {
+        return;
+    }
+    trial best = {identity, mhi_pose_tilt(s, &identity), 0};
+    for (int32_t number = 1; number < 24; number++) {
+        const mhi_pose pose = right_angles(number, 0);
+        double axis[3];
+        const double tilt = mhi_pose_tilt(s, &pose);
+        const int about_x = fabs(axis_of(&pose, axis) - 90) < 1 && fabs(axis[0]) > 0.99;
+        if (tilt < best.rms - 5 || (about_x && tilt < best.rms + 5)) {
+            best = (trial){pose, tilt, 0};
+        }
+    }
+    if (best.rms < 0.5 * LYING) {
+        mhi_text how = {0};
+        write_transform(&best.pose, &how);
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL, "",
+                         "%s: the body lies in every frame: the recording's vertical does not fit "
+                         "the model's gravity",
+                         path);
+        mhi_findings_advise(findings, "%s", how.data == NULL ? "" : how.data);
+        mhi_text_free(&how);
+    }
+}
+
+mhe_status mhi_believe_fit(const mhi_run *run, const mhi_system *system, const mhi_recording *r,
+                           mhi_findings *findings, mhe_error *err) {
+    mhi_pose_search *s = NULL;
+    const mhe_status status = mhi_pose_open(system, r, &s, err);
+    if (status != MHE_OK || s == NULL) {
+        return status;
+    }
+    const char *path = run->data.markers;
+    const mhi_pose identity = mhi_pose_identity();
+    const double as_is = mhi_pose_fit(s, &identity, 1);
+    trial best = {identity, as_is, 0};
+    if (!isnan(as_is)) {
+        try_near(s, &best);
+        if (as_is > FAR) {
+            try_axes(s, &best);
+        }
+        if (best.rms < GAIN * as_is && as_is - best.rms > WORTH && !is_slight(&best.pose)) {
+            tell_transform(path, &best, as_is, findings);
+        } else if (as_is > HOPELESS) {
+            mhi_findings_add(
+                findings, MHI_FINDING_USELESS,
+                "is this the model of that person, and does each label name its place?",
+                "%s: the markers are %.0f mm from the nearest posture (RMS)", path, 1e3 * as_is);
+        } else {
+            check_upright(s, path, as_is, findings);
+        }
+    }
+    mhi_pose_close(s);
+    return MHE_OK;
+}
