@@ -141,15 +141,21 @@ static mhe_status check_fibres(const mhi_system *system, const double *q, int32_
                                mhi_findings *findings, mhe_error *err) {
     const mhe_description *d = mhi_system_description(system);
     mhi_system_context *context = NULL;
-    double *zero = calloc((size_t)d->n_coordinates + (size_t)d->n_muscles + 1, sizeof *zero);
+    const mhe_system *face = mhi_system_face(system);
+    double *zero = calloc((size_t)(d->n_coordinates + d->n_muscles + face->n_z) + 1, sizeof *zero);
     double *span = calloc(2 * (size_t)d->n_muscles + 1, sizeof *span);
     mhe_status status = zero == NULL || span == NULL
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                             : mhi_system_context_create(system, &context, err);
     for (int32_t k = 0; k < n && status == MHE_OK; k++) {
         mhi_muscle_state state;
-        status = mhi_system_muscles(context, q + (ptrdiff_t)k * d->n_coordinates, zero,
-                                    zero + d->n_coordinates, 0, &state, err);
+        const mhe_system_point at = {.size = sizeof at,
+                                     .q = q + (ptrdiff_t)k * d->n_coordinates,
+                                     .v = zero,
+                                     .a = zero,
+                                     .z = zero,
+                                     .c = zero};
+        status = mhi_system_muscles(context, &at, 0, &state, err);
         for (int32_t i = 0; i < d->n_muscles && status == MHE_OK; i++) {
             const mhe_muscle *m = &d->muscles[i];
             const double along =
