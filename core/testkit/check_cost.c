@@ -55,6 +55,17 @@ static const char *const coordinates[N_Q] = {"shoulder_flexion", "elbow_flexion"
 static const char *const muscles[N_MUSCLES] = {"BIClong", "BICshort", "TRIlong", "BRA"};
 static const char *const markers[N_MARKERS] = {"EPICl", "WRIST"};
 
+static const char *const axes[3 * N_MARKERS] = {"EPICl.x", "EPICl.y", "EPICl.z",
+                                                "WRIST.x", "WRIST.y", "WRIST.z"};
+
+static const char *const *entry_names(const mhe_problem *problem, int32_t k) {
+    (void)problem;
+    if (k < 0 || k >= N_SIGNALS) {
+        return NULL;
+    }
+    return signals[k].n == 3 * N_MARKERS ? axes : signals[k].n == N_MUSCLES ? muscles : coordinates;
+}
+
 static mhe_problem make_problem(int32_t formulation, int32_t n_residual_torques) {
     return (mhe_problem){.size = sizeof(mhe_problem),
                          .formulation = formulation,
@@ -67,7 +78,8 @@ static mhe_problem make_problem(int32_t formulation, int32_t n_residual_torques)
                          .coordinate_names = coordinates,
                          .muscle_names = muscles,
                          .marker_names = markers,
-                         .find_signal = find_signal};
+                         .find_signal = find_signal,
+                         .entry_names = entry_names};
 }
 
 /* A cost set up on one problem, seen at one node. */
@@ -78,6 +90,7 @@ typedef struct cost_case {
     mhe_cost_layout layout;
     mhe_stage stage;
     double *y, *y_ref;
+    int32_t first; /* it reads the window's first node alone: elsewhere all may be missing */
 } cost_case;
 
 static mhe_status call_residual(void *data, void *worker, void *scratch, const double *const *in,
@@ -121,6 +134,11 @@ static int check_layout(mhi_kit *kit, cost_case *c) {
             mhi_kit_fail(kit, check, "there is no signal %d (%s)", (int)k, c->title);
             return 0;
         }
+        if (l->at[i] < MHE_AT_NODE || l->at[i] > MHE_AT_FIRST) {
+            mhi_kit_fail(kit, check, "%d is no MHE_AT_* (%s)", (int)l->at[i], c->title);
+            return 0;
+        }
+        c->first |= l->at[i] == MHE_AT_FIRST;
         for (int32_t j = 0; j < signals[k].n; j++, ny++) {
             c->y[ny] = mhi_kit_random(&seed, signals[k].lower, signals[k].upper);
             c->y_ref[ny] = mhi_kit_random(&seed, signals[k].lower, signals[k].upper);
@@ -231,13 +249,13 @@ static void check_case(mhi_kit *kit, cost_case *c) {
     jacobian.call = call_jacobian;
     jacobian.out[0] = (mhi_block){
         .n = c->layout.jacobian == MHE_JACOBIAN_DIAGONAL ? ny : n_res * ny, .zeroed = 1};
-    set_node(c, N_INTERVALS / 2);
+    set_node(c, c->first ? 0 : N_INTERVALS / 2);
     mhi_probe_check(kit, &residual, in);
     if (c->ops->jacobian != NULL) {
         mhi_probe_check(kit, &jacobian, in);
     }
-    for (int32_t node = 0; node <= N_INTERVALS && c->ops->jacobian != NULL;
-         node += N_INTERVALS / 2) {
+    const int32_t last = c->first ? 0 : N_INTERVALS;
+    for (int32_t node = 0; node <= last && c->ops->jacobian != NULL; node += N_INTERVALS / 2) {
         set_node(c, node);
         char *check = mhi_arena_format(&kit->arena, "jacobian against differences (%s, node %d)",
                                        c->title, (int)node);

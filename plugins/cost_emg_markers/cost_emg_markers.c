@@ -6,8 +6,6 @@
  * 1e9 or 1e7. */
 #include "../weighted_terms.h"
 
-#include <string.h>
-
 struct emg_markers { /* weights, and the muscles that have EMG */
     double markers, emg, q, qdot, activation, residual_torque;
     mhe_text_list tracked;
@@ -31,37 +29,6 @@ static const mhe_option emg_markers_options[] = {
                  "a control while its EMG is missing."),
 };
 
-static mhe_status emg_markers_unknown(const mhe_problem *problem, const char *name,
-                                      mhe_error *err) {
-    char names[512] = "";
-    for (int32_t i = 0; i < problem->n_muscles; i++) { /* as many as fit */
-        size_t used = strlen(names);
-        (void)snprintf(names + used, sizeof names - used, "%s%s", i > 0 ? ", " : "",
-                       problem->muscle_names[i]);
-    }
-    return mhe_fail(err, MHE_E_CONFIG, "tracked: the model has no muscle '%s' (it has %s)", name,
-                    names);
-}
-
-/* Marks the muscles with EMG in `has_emg` [n_muscles] and counts them. */
-static mhe_status emg_markers_select(const mhe_problem *problem, const mhe_text_list *tracked,
-                                     uint8_t *has_emg, int32_t *n, mhe_error *err) {
-    *n = 0;
-    for (int32_t t = 0; t < tracked->n; t++) {
-        int32_t i = 0;
-        while (i < problem->n_muscles &&
-               strcmp(problem->muscle_names[i], tracked->values[t]) != 0) {
-            i++;
-        }
-        if (i == problem->n_muscles) {
-            return emg_markers_unknown(problem, tracked->values[t], err);
-        }
-        *n += !has_emg[i];
-        has_emg[i] = 1;
-    }
-    return MHE_OK;
-}
-
 static mhe_status emg_markers_create(const mhe_host *host, const mhe_problem *problem,
                                      const void *config, void **self, mhe_error *err) {
     const struct emg_markers *c = config;
@@ -70,11 +37,13 @@ static mhe_status emg_markers_create(const mhe_host *host, const mhe_problem *pr
     if (has_emg == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for %d muscles", (int)problem->n_muscles);
     }
-    int32_t n_tracked;
-    mhe_status status = emg_markers_select(problem, &c->tracked, has_emg, &n_tracked, err);
     int by_excitation = problem->formulation == MHE_FORMULATION_EXCITATION;
     const char *control = by_excitation ? "excitation" : "activation";
-    int partial = n_tracked > 0 && n_tracked < problem->n_muscles;
+    mhe_status status = mhe_choose_entries(problem, control, "tracked", &c->tracked, has_emg, err);
+    int partial = 0;
+    for (int32_t i = 0; i < problem->n_muscles; i++) {
+        partial |= !has_emg[i];
+    }
     const weighted_term terms[] = {
         {.signal = "markers", .weight = c->markers, .tracks = 1},
         {.signal = control,

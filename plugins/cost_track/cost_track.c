@@ -6,9 +6,8 @@
 #include <mhe/cost.h>
 
 #include <stdlib.h>
-#include <string.h>
 
-enum { TRACK_ALL, TRACK_RUNNING, TRACK_LAST };
+enum { TRACK_ALL, TRACK_RUNNING, TRACK_LAST, TRACK_FIRST };
 
 struct track_config {
     const char *signal;
@@ -24,61 +23,17 @@ static const mhe_option track_options[] = {
     MHE_OPT_REALS(
         struct track_config, value, 0, -1e9, 1e9, "of the signal",
         "Where to: one value for all entries or one an entry; none: the problem's target."),
-    MHE_OPT_ENUM(struct track_config, nodes, "all", "all|running|last",
-                 "Nodes that count; running: all but the last."),
+    MHE_OPT_ENUM(struct track_config, nodes, "all", "all|running|last|first",
+                 "Nodes that count; running: all but the last; first: where a window begins."),
 };
 
 struct track {
     int32_t signal, n, nodes;
     int32_t follows; /* 1: the problem's target; 0: value */
     const char *unit;
-    double *value;  /* [n] */
-    double *counts; /* [n] 1 or 0 */
+    double *value;   /* [n] */
+    uint8_t *counts; /* [n] 1 or 0 */
 };
-
-/* What a signal has one entry (a marker: three) of. */
-static int32_t track_names(const mhe_problem *p, const char *signal, const char *const **names,
-                           const char **what) {
-    if (strcmp(signal, "markers") == 0) {
-        *names = p->marker_names;
-        *what = "marker";
-        return p->n_markers;
-    }
-    if (strcmp(signal, "activation") == 0 || strcmp(signal, "excitation") == 0 ||
-        strcmp(signal, "muscle_force") == 0) {
-        *names = p->muscle_names;
-        *what = "muscle";
-        return p->n_muscles;
-    }
-    *names = p->coordinate_names;
-    *what = "coordinate";
-    return p->n_q;
-}
-
-static mhe_status track_select(struct track *t, const mhe_problem *p, const struct track_config *c,
-                               mhe_error *err) {
-    const char *const *names = NULL;
-    const char *what = NULL;
-    const int32_t n_names = track_names(p, c->signal, &names, &what);
-    const int32_t width = n_names > 0 ? t->n / n_names : 0;
-    for (int32_t i = 0; i < t->n; i++) {
-        t->counts[i] = c->of.n == 0;
-    }
-    for (int32_t k = 0; k < c->of.n; k++) {
-        int32_t i = 0;
-        while (i < n_names && strcmp(names[i], c->of.values[k]) != 0) {
-            i++;
-        }
-        if (i == n_names) {
-            return mhe_fail(err, MHE_E_CONFIG, "of: the model has no %s '%s'", what,
-                            c->of.values[k]);
-        }
-        for (int32_t j = 0; j < width; j++) {
-            t->counts[i * width + j] = 1;
-        }
-    }
-    return MHE_OK;
-}
 
 static mhe_status track_values(struct track *t, const struct track_config *c, mhe_error *err) {
     t->follows = c->value.n == 0;
@@ -111,7 +66,7 @@ static mhe_status track_create(const mhe_host *host, const mhe_problem *problem,
         return mhe_fail(err, MHE_E_CONFIG, "the problem has no signal '%s'", c->signal);
     }
     struct track *t = calloc(1, sizeof *t);
-    if (t == NULL || (t->value = calloc(2 * (size_t)n, sizeof(double))) == NULL) {
+    if (t == NULL || (t->value = calloc((size_t)n, sizeof(double) + 1)) == NULL) {
         free(t);
         return mhe_fail(err, MHE_E_MEMORY, "no memory for %d residuals", (int)n);
     }
@@ -119,8 +74,8 @@ static mhe_status track_create(const mhe_host *host, const mhe_problem *problem,
     t->n = n;
     t->nodes = c->nodes;
     t->unit = unit;
-    t->counts = t->value + n;
-    mhe_status status = track_select(t, problem, c, err);
+    t->counts = (uint8_t *)(t->value + n);
+    mhe_status status = mhe_choose_entries(problem, c->signal, "of", &c->of, t->counts, err);
     if (status == MHE_OK) {
         status = track_values(t, c, err);
     }
@@ -138,6 +93,7 @@ static mhe_status track_layout(const void *self, const mhe_problem *problem, mhe
     (void)problem, (void)err;
     out->n_signals = 1;
     out->signals[0] = t->signal;
+    out->at[0] = t->nodes == TRACK_FIRST ? MHE_AT_FIRST : MHE_AT_NODE;
     out->n_res = t->n;
     out->jacobian = MHE_JACOBIAN_DIAGONAL;
     out->res_unit = t->unit;
@@ -146,7 +102,8 @@ static mhe_status track_layout(const void *self, const mhe_problem *problem, mhe
 
 static int32_t track_on(const struct track *t, const mhe_stage *stage) {
     const int32_t last = stage->node == stage->n_intervals;
-    return t->nodes == TRACK_ALL || (t->nodes == TRACK_LAST) == last;
+    return t->nodes == TRACK_ALL || t->nodes == TRACK_FIRST /* y is NaN at other nodes */ ||
+           (t->nodes == TRACK_LAST) == last;
 }
 
 static mhe_status track_residual(const void *self, const mhe_stage *stage, double *r,

@@ -25,6 +25,13 @@ static const char *const problems[] = {
     "model: {file: $ARM19}\nmuscle: {curves: biorbd, passive: 0.5}\nformulation: activation\n"
     "costs: [{plugin: mhe.cost.track, signal: markers, sigma: 0.1, huber: 3},\n"
     "  {plugin: mhe.cost.track, sigma: 0.1, huber: 1}]\n",
+    /* what the node before had: of states alone, of controls too, of markers; and the first node */
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\ncosts: [{plugin: mhe.cost.rate},\n"
+    "  {plugin: mhe.cost.rate, signal: excitation, of: [BRA]},\n"
+    "  {plugin: mhe.cost.track, signal: q, nodes: first}, {plugin: mhe.cost.min-excitation}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\nformulation: activation\n"
+    "costs: [{plugin: mhe.cost.rate, signal: markers, sigma: 0.1, huber: 1},\n"
+    "  {plugin: mhe.cost.rate, signal: muscle_force, sigma: 100}]\n",
 };
 
 typedef struct point {
@@ -36,9 +43,14 @@ typedef struct point {
 
 static void random_point(const test_fixture *f, uint64_t *seed, double *z) {
     const mhe_system *s = mhi_system_face(f->system);
-    for (int32_t i = 0; i < s->n_x + s->n_u; i++) {
+    const int32_t n_carried = mhi_ocp_face(f->ocp)->n_x - s->n_x;
+    for (int32_t i = 0; i < n_carried; i++) {
+        z[s->n_x + i] = test_random(seed, -1, 1);
+    }
+    for (int32_t j = 0; j < s->n_x + s->n_u; j++) {
+        const int32_t i = j < s->n_x ? j : j + n_carried; /* place in [x; m; u] */
         const int position = i < s->n_q, speed = !position && i < 2 * s->n_q;
-        const int torque = i >= s->n_x + s->n_m;
+        const int torque = j >= s->n_x + s->n_m;
         z[i] = position ? test_random(seed, -0.4, 0.4)
                : speed  ? test_random(seed, 0.5, 2) * (i % 2 == 0 ? 1 : -1)
                : torque ? test_random(seed, -5, 5)

@@ -32,6 +32,13 @@ static int32_t find_signal(const mhe_problem *problem, const char *name, int32_t
     return -1;
 }
 
+static const char *const *entry_names(const mhe_problem *problem, int32_t signal) {
+    static const char *const axes[] = {"EPI.x", "EPI.y", "EPI.z", "WRIST.x", "WRIST.y", "WRIST.z"};
+    return signals[signal].n == 6   ? axes
+           : signals[signal].n == 3 ? problem->muscle_names
+                                    : problem->coordinate_names;
+}
+
 mhe_status cost_rig_open(cost_rig *rig, const char *id, const char *yaml, int32_t formulation,
                          int32_t flags) {
     static const char *const coordinates[] = {"shoulder", "elbow"};
@@ -48,7 +55,8 @@ mhe_status cost_rig_open(cost_rig *rig, const char *id, const char *yaml, int32_
                                   .coordinate_names = coordinates,
                                   .muscle_names = muscles,
                                   .marker_names = markers,
-                                  .find_signal = find_signal},
+                                  .find_signal = find_signal,
+                                  .entry_names = entry_names},
                       .layout = {.size = sizeof rig->layout}};
     const mhe_plugin *plugin = test_plugin(id, MHE_COST_IFACE);
     if (plugin == NULL) {

@@ -27,6 +27,8 @@
 #include <mhe/layout.h>
 #include <mhe/plugin.h>
 
+#include <string.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -97,9 +99,52 @@ typedef struct mhe_stage {
     int32_t ny;
     double time;         /* s */
     const double *y;     /* [ny] */
-    const double *y_ref; /* [ny], NaN where no target is known */
+    const double *y_ref; /* [ny], NaN where no target is known; of MHE_AT_PREVIOUS: the target that
+                          * the node before had */
     void *scratch;       /* [scratch_bytes], 64-byte aligned, this thread's own */
 } mhe_stage;
+
+/* Is an entry the one of that name, or one of its axes ("STER.x" of "STER")? [any] */
+static inline int32_t mhe_entry_is(const char *entry, const char *name) {
+    const size_t length = strlen(name);
+    return strncmp(entry, name, length) == 0 && (entry[length] == '\0' || entry[length] == '.');
+}
+
+/* Entries of a signal that an option `key` names: chosen [n_y] 1 or 0; an empty list names all.
+ * MHE_E_CONFIG: there is no such signal, or no such entry: the text says which there are. [cold] */
+static inline mhe_status mhe_choose_entries(const mhe_problem *problem, const char *signal,
+                                            const char *key, const mhe_text_list *list,
+                                            uint8_t *chosen, mhe_error *err) {
+    int32_t n = 0;
+    const int32_t number = problem->find_signal(problem, signal, &n, NULL);
+    if (number < 0) {
+        return mhe_fail(err, MHE_E_CONFIG, "the problem has no signal '%s'", signal);
+    }
+    const char *const *entries = problem->entry_names(problem, number);
+    for (int32_t i = 0; i < n; i++) {
+        chosen[i] = list->n == 0;
+    }
+    for (int32_t k = 0; k < list->n; k++) {
+        int32_t found = 0;
+        for (int32_t i = 0; i < n; i++) {
+            if (mhe_entry_is(entries[i], list->values[k])) {
+                chosen[i] = 1;
+                found = 1;
+            }
+        }
+        if (!found) {
+            char has[512] = "";
+            for (int32_t i = 0; i < n; i++) { /* as many as fit */
+                const size_t used = strlen(has);
+                (void)snprintf(has + used, sizeof has - used, "%s%s", i > 0 ? ", " : "",
+                               entries[i]);
+            }
+            return mhe_fail(err, MHE_E_CONFIG, "%s: '%s' has no entry '%s' (it has %s)", key,
+                            signal, list->values[k], has);
+        }
+    }
+    return MHE_OK;
+}
 
 typedef struct mhe_cost_ops { /* required: layout, residual */
     uint32_t size;

@@ -220,20 +220,37 @@ static mhe_status start_anew(mhi_step_work *w, mhi_trajectory *t, mhe_error *err
 
 /* ---- solve ---- */
 
+/* Room for the solution; its states are wider than the motion's where costs carry something. */
 static mhe_status take_solution(mhi_step_work *w, mhi_trajectory *t, mhe_solution *out,
                                 mhe_error *err) {
-    const ptrdiff_t n_x = (ptrdiff_t)(t->n + 1) * t->n_x, n_u = (ptrdiff_t)t->n * t->n_u;
+    const int32_t wide = mhi_ocp_face(w->ocp)->n_x;
+    const ptrdiff_t n_x = (ptrdiff_t)(t->n + 1) * wide, n_u = (ptrdiff_t)t->n * t->n_u;
     *out = (mhe_solution){.size = sizeof *out,
-                          .x = t->x,
+                          .x = wide == t->n_x ? t->x : MHI_TAKE(&w->arena, double, n_x),
                           .u = t->u,
                           .lambda = MHI_TAKE(&w->arena, double, n_x),
                           .zx_lower = MHI_TAKE(&w->arena, double, n_x),
                           .zx_upper = MHI_TAKE(&w->arena, double, n_x),
                           .zu_lower = MHI_TAKE(&w->arena, double, n_u),
                           .zu_upper = MHI_TAKE(&w->arena, double, n_u)};
-    return out->lambda && out->zx_lower && out->zx_upper && out->zu_lower && out->zu_upper
-               ? MHE_OK
-               : mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    if (!out->x || !out->lambda || !out->zx_lower || !out->zx_upper || !out->zu_lower ||
+        !out->zu_upper) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t k = 0; k <= t->n && wide > t->n_x; k++) {
+        memcpy(out->x + (ptrdiff_t)k * wide, t->x + (ptrdiff_t)k * t->n_x,
+               sizeof(double) * (size_t)t->n_x);
+    }
+    return mhi_ocp_carry(w->ocp, out->x, out->u, err);
+}
+
+/* The motion without what was carried. */
+static void give_solution(const mhi_step_work *w, const mhe_solution *solution, mhi_trajectory *t) {
+    const int32_t wide = mhi_ocp_face(w->ocp)->n_x;
+    for (int32_t k = 0; k <= t->n && wide > t->n_x; k++) {
+        memcpy(t->x + (ptrdiff_t)k * t->n_x, solution->x + (ptrdiff_t)k * wide,
+               sizeof(double) * (size_t)t->n_x);
+    }
 }
 
 static mhe_status solve(mhi_step_work *w, mhi_trajectory *t, mhe_solve_info *info, mhe_error *err) {
@@ -251,6 +268,7 @@ static mhe_status solve(mhi_step_work *w, mhi_trajectory *t, mhe_solve_info *inf
     if (status == MHE_OK) {
         *info = (mhe_solve_info){.size = sizeof *info};
         status = ops->solve(self, w->setup->control, &solution, info, &why);
+        give_solution(w, &solution, t);
     }
     if (self != NULL) {
         ops->destroy(self);
@@ -298,7 +316,6 @@ static mhe_status solve_once(mhi_step_work *w, mhi_trajectory *t, mhe_solve_info
 
 /* A and B of every interval; the same whether the solution was found now or read back. */
 static mhe_status linearise(mhi_step_work *w, mhi_arena *arena, mhi_trajectory *t, mhe_error *err) {
-    const mhe_stage_problem *face = mhi_ocp_face(w->ocp);
     const ptrdiff_t n_A = (ptrdiff_t)t->n_x * t->n_x, n_B = (ptrdiff_t)t->n_x * t->n_u;
     mhe_status status = MHE_OK;
     t->A = MHI_TAKE(arena, double, t->n *n_A);
@@ -308,10 +325,9 @@ static mhe_status linearise(mhi_step_work *w, mhi_arena *arena, mhi_trajectory *
     }
     mhi_ocp_forget(w->ocp);
     for (int32_t k = 0; k < t->n && status == MHE_OK; k++) {
-        const mhe_stage_values out = {
-            .size = sizeof out, .x_next = w->x, .A = t->A + k * n_A, .B = t->B + k * n_B};
-        status = face->evaluate(face, 0, k, t->x + (ptrdiff_t)k * t->n_x,
-                                t->u + (ptrdiff_t)k * t->n_u, &out, err);
+        status =
+            mhi_ocp_linearise(w->ocp, k, t->x + (ptrdiff_t)k * t->n_x, t->u + (ptrdiff_t)k * t->n_u,
+                              w->x, t->A + k * n_A, t->B + k * n_B, err);
     }
     return status;
 }

@@ -77,7 +77,7 @@ static mhe_status guess_postures(mhe_estimator *e, double *distance, double *nea
         take_angles(e, k, q);
         n_seen += !isnan(distance[k]);
         *nearest = fmin(*nearest, distance[k]);
-        memcpy(mhi_row(e->window.guess_x, k, e->n_x), q, sizeof(double) * (size_t)e->n_q);
+        memcpy(mhi_row(e->window.guess_x, k, e->window.n_x), q, sizeof(double) * (size_t)e->n_q);
     }
     if (n_seen > 0 && *nearest > 1.0) {
         return mhe_fail(
@@ -106,8 +106,8 @@ static void drop_outliers(mhe_estimator *e, const double *distance, double neare
         while (good < e->window.n && distance[good] > nearest + e->trust.outlier) {
             good++;
         }
-        memcpy(mhi_row(e->window.guess_x, k, e->n_x), mhi_row(e->window.guess_x, good, e->n_x),
-               bytes);
+        memcpy(mhi_row(e->window.guess_x, k, e->window.n_x),
+               mhi_row(e->window.guess_x, good, e->window.n_x), bytes);
     }
 }
 
@@ -125,7 +125,7 @@ static void guess_velocities(mhe_estimator *e, int32_t k, double *v) {
     for (int32_t i = 0; i < e->n_q; i++) {
         double sum = 0;
         for (int32_t j = from; j <= to; j++) {
-            sum += (e->window.times[j] - mean) * mhi_row(e->window.guess_x, j, e->n_x)[i];
+            sum += (e->window.times[j] - mean) * mhi_row(e->window.guess_x, j, e->window.n_x)[i];
         }
         v[i] = sum / squares;
     }
@@ -153,7 +153,7 @@ static void guess_states(mhe_estimator *e, int32_t k, double *x) {
 /* Velocities by slopes, muscles by the EMG. */
 static void guess_rest(mhe_estimator *e) {
     for (int32_t k = 0; k <= e->window.n; k++) {
-        double *x = mhi_row(e->window.guess_x, k, e->n_x);
+        double *x = mhi_row(e->window.guess_x, k, e->window.n_x);
         guess_velocities(e, k, x + e->n_q);
         guess_states(e, k, x);
         if (k < e->window.n) {
@@ -191,8 +191,13 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     }
     drop_outliers(e, e->begin.distance, nearest);
     guess_rest(e);
+    mhi_ocp_set_begins(e->ocp, 1);
+    status = mhi_ocp_carry(e->ocp, e->window.guess_x, e->window.guess_u, err);
+    if (status != MHE_OK) {
+        return status;
+    }
     memcpy(e->window.solution.x, e->window.guess_x,
-           sizeof(double) * (size_t)((e->window.n + 1) * e->n_x));
+           sizeof(double) * (size_t)((e->window.n + 1) * e->window.n_x));
     memcpy(e->window.solution.u, e->window.guess_u,
            sizeof(double) * (size_t)(e->window.n * e->n_u));
     e->window.solution.has_multipliers = 0;

@@ -106,7 +106,8 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
     const mhi_run *run = e->run;
     const int32_t n = run->horizon.window;
     const double interval = mhi_ocp_problem(e->ocp)->interval; /* a guess */
-    mhe_status status = mhi_window_create(&e->window, n, e->n_x, e->n_u, &e->arena, err);
+    mhe_status status =
+        mhi_window_create(&e->window, n, mhi_ocp_face(e->ocp)->n_x, e->n_u, &e->arena, err);
     if (status == MHE_OK) {
         status =
             mhi_channels_create(run, e->ocp, e->description, n + 1, &e->arena, &e->channels, err);

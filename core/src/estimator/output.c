@@ -91,7 +91,7 @@ static void give_tracked(mhe_estimator *e, int32_t i, int32_t k, int32_t control
 /* States and controls of node k, and the muscles there. */
 static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe_error *err) {
     mhi_output *o = &e->output;
-    const double *x = mhi_row(e->window.solution.x, k, e->n_x);
+    const double *x = mhi_row(e->window.solution.x, k, e->window.n_x);
     const double *u = mhi_row(e->window.solution.u, controls, e->n_u);
     const double *a = mhi_system_activation(e->system, x, u);
     const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;

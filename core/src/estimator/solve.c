@@ -26,7 +26,7 @@ static int all_finite(const double *values, ptrdiff_t n) {
 
 static void take_back_guess(mhe_estimator *e) {
     memcpy(e->window.solution.x, e->window.guess_x,
-           sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->n_x);
+           sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->window.n_x);
     memcpy(e->window.solution.u, e->window.guess_u,
            sizeof(double) * (size_t)e->window.n * (size_t)e->n_u);
     e->window.solution.has_multipliers = 0;
@@ -36,12 +36,12 @@ static void take_back_guess(mhe_estimator *e) {
 static void predict(mhe_estimator *e) {
     take_back_guess(e);
     for (int32_t k = 0; k < e->window.n; k++) {
-        double *next = mhi_row(e->window.solution.x, k + 1, e->n_x);
-        mhe_status status = mhi_ocp_predict(e->ocp, mhi_row(e->window.solution.x, k, e->n_x),
+        double *next = mhi_row(e->window.solution.x, k + 1, e->window.n_x);
+        mhe_status status = mhi_ocp_predict(e->ocp, mhi_row(e->window.solution.x, k, e->window.n_x),
                                             mhi_row(e->window.solution.u, k, e->n_u), next, NULL);
-        if (status != MHE_OK || !all_finite(next, e->n_x)) {
-            memcpy(next, mhi_row(e->window.guess_x, k + 1, e->n_x),
-                   sizeof(double) * (size_t)e->n_x);
+        if (status != MHE_OK || !all_finite(next, e->window.n_x)) {
+            memcpy(next, mhi_row(e->window.guess_x, k + 1, e->window.n_x),
+                   sizeof(double) * (size_t)e->window.n_x);
         }
     }
 }
@@ -86,7 +86,8 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
     int32_t iterations = 0, cut = 0;
     double factor = 1, evaluation_time = 0;
     while (!mhi_phase_settled(e) && !cut && status == MHE_OK) {
-        memcpy(e->window.prior_centre, e->window.solution.x, sizeof(double) * (size_t)e->n_x);
+        memcpy(e->window.prior_centre, e->window.solution.x,
+               sizeof(double) * (size_t)e->window.n_x);
         set_proximal_weight(e, factor);
         status = solve_once(e, info, err);
         iterations += info->iterations;
@@ -141,7 +142,7 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
                             mhe_error *err) {
     mhe_error why = {0};
     memcpy(e->window.guess_x, e->window.solution.x,
-           sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->n_x);
+           sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->window.n_x);
     memcpy(e->window.guess_u, e->window.solution.u,
            sizeof(double) * (size_t)e->window.n * (size_t)e->n_u);
     const mhe_status status = (mhi_phase_settled(e) ? solve_once : settle)(e, info, &why);
@@ -151,8 +152,9 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
     if (status != MHE_OK) {
         tell_failure(e, why.text);
     }
-    const int finite = all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->n_x) &&
-                       all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);
+    const int finite =
+        all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->window.n_x) &&
+        all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);
     const int begun = info->iterations > 0 || info->outcome == MHE_SOLVE_CONVERGED;
     const int usable = status == MHE_OK && finite && begun && info->primal_residual <= CONSISTENT;
     *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;

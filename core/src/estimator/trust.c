@@ -48,7 +48,7 @@ void mhi_trust_clear(mhi_trust *t) {
 
 /* Markers of the solution at node k; NaN where the model has none there. */
 static void expect(mhe_estimator *e, int32_t k, double *markers) {
-    if (mhi_system_markers(mhi_ocp_context(e->ocp), mhi_row(e->window.solution.x, k, e->n_x),
+    if (mhi_system_markers(mhi_ocp_context(e->ocp), mhi_row(e->window.solution.x, k, e->window.n_x),
                            markers, NULL, NULL) != MHE_OK) {
         for (int32_t i = 0; i < 3 * e->n_k; i++) {
             markers[i] = NAN;
@@ -198,8 +198,8 @@ void mhi_trust_solved(mhe_estimator *e, int32_t frame_status) {
     }
     const mhi_channel *markers = mhi_channels_find(&e->channels, MHI_SIGNAL_MARKERS);
     if (mhi_system_markers(mhi_ocp_context(e->ocp),
-                           mhi_row(e->window.solution.x, e->window.n, e->n_x), t->expected, NULL,
-                           NULL) == MHE_OK) {
+                           mhi_row(e->window.solution.x, e->window.n, e->window.n_x), t->expected,
+                           NULL, NULL) == MHE_OK) {
         const double fit = mhi_rms_distance(
             t->expected, mhi_row(markers->believed, e->window.n, 3 * e->n_k), 3 * e->n_k, 3);
         t->fit = isnan(fit) ? t->fit : fit;

@@ -76,8 +76,12 @@ static void set_general_bounds(mhe_estimator *e) {
 }
 
 void mhi_window_set_bounds(mhe_estimator *e) {
-    const size_t bytes = sizeof(double) * (size_t)e->n_x;
+    const size_t bytes = sizeof(double) * (size_t)e->window.n_x;
     set_general_bounds(e);
+    mhi_ocp_set_begins(e->ocp, !mhi_phase_settled(e));
+    for (int32_t i = e->n_x; i < e->window.n_x && !mhi_phase_settled(e); i++) {
+        e->window.solution.x[i] = 0; /* nothing is known of a node before */
+    }
     if (mhi_phase_settled(e)) {
         memcpy(mhi_ocp_x_lower(e->ocp, 0), e->window.solution.x, bytes);
         memcpy(mhi_ocp_x_upper(e->ocp, 0), e->window.solution.x, bytes);
@@ -100,11 +104,11 @@ void mhi_window_set_targets(mhe_estimator *e) {
 
 /* The newest state, which no solve has seen: where the last control leads. */
 static void extend(mhe_estimator *e) {
-    double *x = mhi_row(e->window.solution.x, e->window.n, e->n_x);
-    const double *before = mhi_row(e->window.solution.x, e->window.n - 1, e->n_x);
+    double *x = mhi_row(e->window.solution.x, e->window.n, e->window.n_x);
+    const double *before = mhi_row(e->window.solution.x, e->window.n - 1, e->window.n_x);
     const double *u = mhi_row(e->window.solution.u, e->window.n - 1, e->n_u);
     mhe_status status = mhi_ocp_predict(e->ocp, before, u, x, NULL);
-    for (int32_t i = 0; i < e->n_x; i++) {
+    for (int32_t i = 0; i < e->window.n_x; i++) { /* with what is carried */
         const double value = status == MHE_OK && isfinite(x[i]) ? x[i] : before[i];
         x[i] = mhi_clip(value, mhi_ocp_x_lower(e->ocp, e->window.n)[i],
                         mhi_ocp_x_upper(e->ocp, e->window.n)[i]);

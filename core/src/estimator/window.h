@@ -10,7 +10,7 @@
 #include <mhe/solver.h>
 
 typedef struct mhi_window {
-    int32_t n, n_x, n_u; /* intervals, states, controls */
+    int32_t n, n_x, n_u; /* intervals, states with what costs carry along, controls */
     int32_t filled;      /* nodes that are there, of n+1, oldest first */
     int32_t prepared;    /* the start of the next solve is made */
     int32_t solved;      /* windows so far */

@@ -22,6 +22,13 @@ int32_t mhi_ocp_find_signal(const mhe_problem *problem, const char *name, int32_
     return -1;
 }
 
+const char *const *mhi_ocp_entry_names(const mhe_problem *problem, int32_t signal) {
+    const mhi_ocp *ocp = problem->data;
+    return signal < 0 || signal >= MHI_N_SIGNALS || ocp->signals.signal[signal].n_y == 0
+               ? NULL
+               : ocp->entry_names[signal];
+}
+
 static int all_finite(const double *values, int32_t n) {
     double sum = 0;
     for (int32_t i = 0; i < n; i++) {
@@ -41,20 +48,25 @@ static void mirror(const double *lower, int32_t n_z, int32_t n, double *block) {
 
 /* The gradient and the lower triangle of the Hessian by z, given out as what is wanted of grad_x,
  * grad_u, xx, ux, uu. */
-static void spread(const mhi_ocp_worker *w, int32_t n_x, int32_t n_u, const mhe_stage_values *out) {
-    const int32_t n_z = n_x + n_u;
+static void spread(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
+                   const mhe_stage_values *out) {
+    const int32_t n_x = ocp->n_x, n_u = n_z > n_x ? ocp->face.n_u : 0;
     const double *of_u = w->hessian + n_x * n_z;
-    if (out->grad_x != NULL) {
-        memcpy(out->grad_x, w->gradient, sizeof(double) * (size_t)n_x);
-    }
-    if (out->hess_xx != NULL) {
-        mirror(w->hessian, n_z, n_x, out->hess_xx);
+    if (ocp->signals.n_carried > 0) {
+        mhi_ocp_spread_carried(ocp, w, out);
+    } else {
+        if (out->grad_x != NULL) {
+            memcpy(out->grad_x, w->gradient, sizeof(double) * (size_t)n_x);
+        }
+        if (out->hess_xx != NULL) {
+            mirror(w->hessian, n_z, n_x, out->hess_xx);
+        }
+        for (int32_t i = 0; i < n_u && out->hess_ux != NULL; i++) {
+            memcpy(out->hess_ux + i * n_x, of_u + i * n_z, sizeof(double) * (size_t)n_x);
+        }
     }
     if (out->grad_u != NULL && n_u > 0) {
         memcpy(out->grad_u, w->gradient + n_x, sizeof(double) * (size_t)n_u);
-    }
-    for (int32_t i = 0; i < n_u && out->hess_ux != NULL; i++) {
-        memcpy(out->hess_ux + i * n_x, of_u + i * n_z, sizeof(double) * (size_t)n_x);
     }
     if (out->hess_uu != NULL && n_u > 0) {
         mirror(of_u + n_x, n_z, n_u, out->hess_uu);
@@ -67,7 +79,7 @@ static int wants_derivatives(const mhe_stage_values *out) {
 }
 
 static void add_prior(const mhi_ocp *ocp, const double *x, int32_t n_z, mhi_term_sum *sum) {
-    for (int32_t i = 0; i < ocp->face.n_x; i++) {
+    for (int32_t i = 0; i < ocp->n_x; i++) {
         const double weight = ocp->prior_weight[i], difference = x[i] - ocp->prior_centre[i];
         sum->cost += 0.5 * weight * difference * difference;
         if (sum->gradient != NULL) {
@@ -80,12 +92,15 @@ static void add_prior(const mhi_ocp *ocp, const double *x, int32_t n_z, mhi_term
 static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
                                 const double *u, const mhe_stage_values *out, mhe_error *err) {
     const int derivatives = wants_derivatives(out);
-    const int32_t n_x = ocp->face.n_x, n_u = u == NULL ? 0 : ocp->face.n_u, n_z = n_x + n_u;
+    const int32_t n_carried = ocp->signals.n_carried;
+    const int32_t n_z = u == NULL && n_carried == 0 ? ocp->n_x : ocp->signals.n_z + n_carried;
     mhe_status status = mhi_signals_evaluate(&ocp->signals, ocp->system, w->system, ocp->wanted, x,
                                              u, w->y, derivatives ? w->jacobian : NULL, err);
     if (status != MHE_OK) {
         return status;
     }
+    w->linearised = derivatives;
+    mhi_ocp_read_carried(ocp, k, x, w->y);
     mhi_term_sum sum = {0};
     if (derivatives) {
         sum.gradient = w->gradient;
@@ -98,10 +113,11 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
                              .n_intervals = ocp->face.n_intervals,
                              .time = ocp->times[k]};
     const double scale = u == NULL ? 1 : ocp->interval;
+    const double *targets = ocp->targets + (ptrdiff_t)k * ocp->signals.n_y;
+    const double *before = k == 0 ? NULL : targets - ocp->signals.n_y;
     for (int32_t i = 0; i < ocp->n_terms && status == MHE_OK; i++) {
-        status = mhi_term_add(&ocp->terms[i], &w->terms[i], &ocp->signals, &stage, w->y,
-                              ocp->targets + (ptrdiff_t)k * ocp->signals.n_y, w->jacobian, scale,
-                              n_z, &sum, err);
+        status = mhi_term_add(&ocp->terms[i], &w->terms[i], &ocp->signals, &stage, w->y, targets,
+                              before, w->jacobian, scale, n_z, &sum, err);
     }
     if (status != MHE_OK) {
         return status;
@@ -116,7 +132,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
         *out->cost = sum.cost;
     }
     if (derivatives) {
-        spread(w, n_x, n_u, out);
+        spread(ocp, w, n_z, out);
     }
     return MHE_OK;
 }
@@ -139,13 +155,12 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
         return mhe_fail(err, MHE_RETRY, "a state or control is not finite");
     }
     mhe_status status = MHE_OK;
+    w->linearised = 0;
     if (out->cost != NULL || wants_derivatives(out)) {
         status = evaluate_cost(ocp, w, k, x, u, out, err);
     }
     if (status == MHE_OK && u != NULL && out->x_next != NULL) {
-        const mhe_step_derivatives d = {sizeof d, out->A, out->B, out->P};
-        status = ocp->integrator->step(w->integrator, x, u, NULL, ocp->interval,
-                                       interval_memory(ocp, k), out->x_next, &d, err);
+        status = mhi_ocp_step(ocp, w, interval_memory(ocp, k), x, u, out, err);
     }
     return status;
 }
@@ -248,8 +263,20 @@ void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {
 
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
                            mhe_error *err) {
-    return ocp->integrator->step(ocp->workers[0].integrator, x, u, NULL, ocp->interval, NULL,
-                                 x_next, NULL, err);
+    const mhe_stage_values out = {.size = sizeof out, .x_next = x_next};
+    ocp->workers[0].linearised = 0;
+    return mhi_ocp_step(ocp, &ocp->workers[0], NULL, x, u, &out, err);
+}
+
+int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {
+    return ocp->n_x;
+}
+
+mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                             double *x_next, double *A, double *B, mhe_error *err) {
+    const mhe_step_derivatives d = {sizeof d, A, B, NULL};
+    return ocp->integrator->step(ocp->workers[0].integrator, x, u, NULL, ocp->interval,
+                                 interval_memory(ocp, k), x_next, &d, err);
 }
 
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp) {

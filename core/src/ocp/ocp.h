@@ -41,6 +41,15 @@ const mhi_signals *mhi_ocp_signals(const mhi_ocp *ocp);
 int32_t mhi_ocp_control(const mhi_ocp *ocp);
 int32_t mhi_ocp_reads(const mhi_ocp *ocp, int32_t signal); /* 1: a term reads the signal */
 
+/* What the solver's state begins with is the system's; where costs read the node before, what they
+ * read follows, divided by a usual size, [face.n_x - n_x] entries that the owner need not know. */
+int32_t mhi_ocp_n_x(const mhi_ocp *ocp);
+/* 1 (as at the start): nothing is known of a node before node 0; what is carried into it is fixed
+ * at 0 and costs see NaN. 0: x_0 holds what was carried, as after a shift. Sets those bounds. */
+void mhi_ocp_set_begins(mhi_ocp *ocp, int32_t begins);
+/* Fills in what x [(N+1) x face.n_x] carries from its states and u. MHE_RETRY: no value there. */
+mhe_status mhi_ocp_carry(mhi_ocp *ocp, double *x, const double *u, mhe_error *err);
+
 /* Arrays that the owner of the problem may write between solves, at node k. */
 double *mhi_ocp_x_lower(mhi_ocp *ocp, int32_t k); /* [n_x] */
 double *mhi_ocp_x_upper(mhi_ocp *ocp, int32_t k);
@@ -67,6 +76,9 @@ void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight)
 /* x_next = F(x, u) by worker 0. */
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
                            mhe_error *err);
+/* The same of interval k with A [n_x x n_x] and B [n_x x n_u], of the system alone. */
+mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                             double *x_next, double *A, double *B, mhe_error *err);
 /* The system context of worker 0, for kinematics outside a solve. */
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp);
 

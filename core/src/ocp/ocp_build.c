@@ -8,14 +8,14 @@
 
 /* A diagonal entry moves with itself and its muscle's control; all others, which see positions,
  * with everything. */
-static void dynamics_pattern(const mhe_system *f, uint8_t *A, uint8_t *B) {
+static void dynamics_pattern(const mhe_system *f, int32_t n_x, uint8_t *A, uint8_t *B) {
     for (int32_t b = 0; b < f->layout->n_blocks; b++) {
         const mhe_block *block = mhe_layout_at(f->layout, b);
         const int diagonal = block->structure == MHE_STRUCTURE_DIAGONAL;
         for (int32_t k = 0; k < block->count && block->role == MHE_ROLE_STATE; k++) {
             const int32_t i = block->first + k;
             for (int32_t j = 0; j < f->n_x; j++) {
-                A[i * f->n_x + j] = !diagonal || i == j;
+                A[i * n_x + j] = !diagonal || i == j;
             }
             for (int32_t j = 0; j < f->n_u; j++) {
                 B[i * f->n_u + j] = !diagonal || block->owner[k] == j;
@@ -24,8 +24,31 @@ static void dynamics_pattern(const mhe_system *f, uint8_t *A, uint8_t *B) {
     }
 }
 
+/* What is carried moves with all that its signal depends on. */
+static void carried_pattern(const mhi_ocp *ocp, uint8_t *A, uint8_t *B) {
+    const int32_t n_x = ocp->face.n_x, n_u = ocp->face.n_u;
+    for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
+        const mhi_signal *s = &ocp->signals.signal[i];
+        const mhi_signal *m = &ocp->signals.signal[MHI_N_SIGNALS + i];
+        for (int32_t j = 0; j < m->n_y; j++) {
+            const int32_t row = m->column - n_u + j;
+            const int32_t first = s->n_columns == 0 ? s->column + j : s->column;
+            const int32_t end = first + (s->n_columns == 0 ? 1 : s->n_columns);
+            for (int32_t c = first; c < end; c++) {
+                *(c < ocp->n_x ? A + row * n_x + c : B + row * n_u + c - ocp->n_x) = 1;
+            }
+        }
+    }
+}
+
+/* Place in the solver's [x; m; u] of column i of z = [x; u; m]. */
+static int32_t solver_column(const mhi_ocp *ocp, int32_t i) {
+    const int32_t n_x = ocp->n_x, n_u = ocp->face.n_u;
+    return i < n_x ? i : i < n_x + n_u ? i + ocp->signals.n_carried : i - n_u;
+}
+
 static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err) {
-    const int32_t n_x = f->n_x, n_u = f->n_u, n_z = n_x + n_u;
+    const int32_t n_x = ocp->face.n_x, n_u = f->n_u, n_z = n_x + n_u;
     uint8_t *A = MHI_TAKE(&ocp->arena, uint8_t, n_x * n_x);
     uint8_t *B = MHI_TAKE(&ocp->arena, uint8_t, n_x * n_u);
     uint8_t *xx = MHI_TAKE(&ocp->arena, uint8_t, n_x * n_x);
@@ -36,16 +59,18 @@ static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err
     if (!A || !B || !xx || !ux || !uu || !zz || !columns) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    dynamics_pattern(f, A, B);
-    for (int32_t i = 0; i < n_x; i++) {
+    dynamics_pattern(f, n_x, A, B);
+    carried_pattern(ocp, A, B);
+    for (int32_t i = 0; i < ocp->n_x; i++) {
         zz[i * n_z + i] = 1; /* the prior */
     }
     for (int32_t i = 0; i < ocp->n_terms; i++) {
         mhi_term_pattern(&ocp->terms[i], &ocp->signals, n_z, columns, zz);
     }
-    for (int32_t i = 0; i < n_z; i++) {
-        for (int32_t j = 0; j < n_z; j++) {
-            uint8_t set = zz[i * n_z + j];
+    for (int32_t a = 0; a < n_z; a++) {
+        for (int32_t b = 0; b < n_z; b++) {
+            const uint8_t set = zz[a * n_z + b];
+            const int32_t i = solver_column(ocp, a), j = solver_column(ocp, b);
             if (i < n_x && j < n_x) {
                 xx[i * n_x + j] = set;
             } else if (i >= n_x && j < n_x) {
@@ -74,11 +99,13 @@ static double *filled(mhi_arena *arena, ptrdiff_t n, double value) {
 static mhe_status create_worker(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err) {
     const int32_t n_z = ocp->face.n_x + ocp->face.n_u;
     w->terms = MHI_TAKE(&ocp->arena, mhi_term_workspace, ocp->n_terms);
-    w->y = MHI_TAKE(&ocp->arena, double, ocp->signals.n_y);
+    w->y = MHI_TAKE(&ocp->arena, double, ocp->signals.n_y + ocp->signals.n_carried);
+    w->A = MHI_TAKE(&ocp->arena, double, ocp->signals.n_carried > 0 ? ocp->n_x * ocp->n_x : 0);
+    w->B = MHI_TAKE(&ocp->arena, double, ocp->signals.n_carried > 0 ? ocp->n_x * ocp->face.n_u : 0);
     w->jacobian = MHI_TAKE(&ocp->arena, double, ocp->signals.n_jacobian);
     w->gradient = MHI_TAKE(&ocp->arena, double, n_z);
     w->hessian = MHI_TAKE(&ocp->arena, double, n_z *n_z);
-    if (!w->terms || !w->y || !w->jacobian || !w->gradient || !w->hessian) {
+    if (!w->terms || !w->y || !w->A || !w->B || !w->jacobian || !w->gradient || !w->hessian) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     mhe_status status = mhi_system_context_create(ocp->system, &w->system, err);
@@ -118,6 +145,24 @@ static const char *marker_name(const mhe_description *d, int32_t i) {
     return d->markers[i].name;
 }
 
+/* Of every signal; a marker has three. */
+static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
+    const mhe_problem *p = &ocp->problem;
+    const char **axes = MHI_TAKE(&ocp->arena, const char *, 3 * p->n_markers);
+    for (int32_t i = 0; i < 3 * p->n_markers && axes != NULL; i++) {
+        axes[i] = mhi_arena_format(&ocp->arena, "%s.%c", p->marker_names[i / 3], "xyz"[i % 3]);
+        axes = axes[i] == NULL ? NULL : axes;
+    }
+    for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
+        const int32_t of_muscles = i == MHI_SIGNAL_ACTIVATION || i == MHI_SIGNAL_EXCITATION ||
+                                   i == MHI_SIGNAL_MUSCLE_FORCE;
+        ocp->entry_names[i] = i == MHI_SIGNAL_MARKERS ? axes
+                              : of_muscles            ? p->muscle_names
+                                                      : p->coordinate_names;
+    }
+    return axes == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+}
+
 static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     const mhe_description *d = mhi_system_description(setup->system);
     mhe_problem *p = &ocp->problem;
@@ -131,7 +176,8 @@ static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_erro
                        .interval = setup->interval,
                        .data = ocp,
                        .find_signal = mhi_ocp_find_signal,
-                       .layout = mhi_system_face(setup->system)->layout};
+                       .layout = mhi_system_face(setup->system)->layout,
+                       .entry_names = mhi_ocp_entry_names};
     mhe_status status =
         name_list(&ocp->arena, p->n_q, &p->coordinate_names, err, coordinate_name, d);
     if (status == MHE_OK) {
@@ -140,7 +186,7 @@ static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_erro
     if (status == MHE_OK) {
         status = name_list(&ocp->arena, p->n_markers, &p->marker_names, err, marker_name, d);
     }
-    return status;
+    return status == MHE_OK ? name_entries(ocp, err) : status;
 }
 
 static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
@@ -161,9 +207,8 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->face.u_lower = ocp->u_lower;
     ocp->face.u_upper = ocp->u_upper;
     ocp->workers = MHI_TAKE(&ocp->arena, mhi_ocp_worker, ocp->face.n_workers);
-    ocp->terms = MHI_TAKE(&ocp->arena, mhi_term, ocp->n_terms);
     if (!ocp->x_lower || !ocp->x_upper || !ocp->u_lower || !ocp->u_upper || !ocp->targets ||
-        !ocp->times || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers || !ocp->terms) {
+        !ocp->times || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;
@@ -196,7 +241,8 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
 static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     const mhe_system *f = mhi_system_face(setup->system);
     mhi_signals_layout(setup->system, &ocp->signals);
-    mhe_status status = take_arrays(ocp, err);
+    ocp->terms = MHI_TAKE(&ocp->arena, mhi_term, ocp->n_terms);
+    mhe_status status = ocp->terms == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
     if (status == MHE_OK) {
         status = set_problem(ocp, setup, err);
     }
@@ -205,6 +251,13 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
         if (status == MHE_OK) {
             ocp->wanted |= mhi_term_reads(&ocp->terms[i]);
         }
+    }
+    for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
+        ocp->carried |= ocp->signals.signal[MHI_N_SIGNALS + i].n_y > 0 ? 1u << i : 0;
+    }
+    ocp->face.n_x = f->n_x + ocp->signals.n_carried; /* as the terms ask */
+    if (status == MHE_OK) {
+        status = take_arrays(ocp, err);
     }
     if (status == MHE_OK) {
         status = set_patterns(ocp, f, err);
@@ -215,6 +268,9 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
     }
     if (status == MHE_OK) {
         status = take_memory(ocp, err);
+    }
+    if (status == MHE_OK) {
+        mhi_ocp_set_begins(ocp, 1);
     }
     for (int32_t i = 0; i < ocp->face.n_workers && status == MHE_OK; i++) {
         ocp->n_workers_created = i + 1;
@@ -238,6 +294,7 @@ mhe_status mhi_ocp_create(const mhi_ocp_setup *setup, mhi_ocp **result, mhe_erro
                                     .data = ocp,
                                     .evaluate = mhi_ocp_evaluate};
     ocp->system = setup->system;
+    ocp->n_x = f->n_x;
     ocp->integrator = setup->integrator->ops;
     ocp->n_terms = setup->n_terms;
     ocp->interval = setup->interval;

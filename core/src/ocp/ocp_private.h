@@ -12,7 +12,9 @@ typedef struct mhi_ocp_worker {
     void *integrator;
     mhi_term_workspace *terms;  /* [n_terms] */
     double *y, *jacobian;       /* of all signals */
-    double *gradient, *hessian; /* [n_z], [n_z x n_z] */
+    double *gradient, *hessian; /* [n_z], [n_z x n_z]; z = [x; u; m], see signals.h */
+    double *A, *B;              /* of the system alone, where something is carried; else NULL */
+    int32_t linearised;         /* y and jacobian are those of the node and point in work */
 } mhi_ocp_worker;
 
 struct mhi_ocp {
@@ -24,24 +26,37 @@ struct mhi_ocp {
     void *integrator_self;
     mhi_term *terms;
     int32_t n_terms, n_terms_created, n_workers_created;
-    uint32_t wanted; /* signals any term reads */
+    uint32_t wanted;  /* signals any term reads */
+    uint32_t carried; /* those of the node before */
+    int32_t n_x;      /* of the system; face.n_x = n_x + signals.n_carried */
+    int32_t begins;   /* 1: what is carried into node 0 is not known */
     double interval;
     const atomic_int *stop; /* NULL: never */
     double *x_lower, *x_upper, *u_lower, *u_upper;
     double *targets;                     /* [(N+1) x n_y] */
     double *times;                       /* [N+1] */
     double *prior_centre, *prior_weight; /* [n_x] */
-    double *memory;                      /* [N x memory_size] a ring, see interval_memory() */
-    int32_t memory_size, first_memory;   /* of the integrator, one interval; place of interval 0 */
+    const char *const *entry_names[MHI_N_SIGNALS];
+    double *memory;                    /* [N x memory_size] a ring, see interval_memory() */
+    int32_t memory_size, first_memory; /* of the integrator, one interval; place of interval 0 */
     mhi_ocp_worker *workers;
     mhi_arena arena;
 };
 
 /* The functions that the solver and the costs call. */
+const char *const *mhi_ocp_entry_names(const mhe_problem *problem, int32_t signal);
 int32_t mhi_ocp_find_signal(const mhe_problem *problem, const char *name, int32_t *n_y,
                             const char **unit);
 mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker, int32_t k,
                             const double *x, const double *u, const mhe_stage_values *out,
                             mhe_error *err);
+
+/* carry.c. Gradient and Hessian as the solver wants them; values of the node before at node k from
+ * its state, NaN where there is none; x_next, A and B of an interval with all that is carried. */
+void mhi_ocp_spread_carried(const mhi_ocp *ocp, const mhi_ocp_worker *w,
+                            const mhe_stage_values *out);
+void mhi_ocp_read_carried(const mhi_ocp *ocp, int32_t k, const double *x, double *y);
+mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, double *memory, const double *x,
+                        const double *u, const mhe_stage_values *out, mhe_error *err);
 
 #endif

@@ -4,6 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#define USUAL_FORCE 500.0 /* N */
+#define USUAL_MOMENT 20.0 /* N m */
+
 void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     const mhe_system *f = mhi_system_face(system);
     const int32_t n_k = mhi_system_description(system)->n_markers;
@@ -30,10 +33,30 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         mhi_signal *s = &signals->signal[i];
         s->offset = signals->n_y;
+        s->scale = 1;
         s->jacobian = signals->n_jacobian;
         signals->n_y += s->n_y;
         signals->n_jacobian += s->n_y * s->n_columns;
     }
+    signals->n_z = f->n_x + f->n_u;
+}
+
+int32_t mhi_signals_carry(mhi_signals *signals, int32_t i) {
+    const mhi_signal *of = &signals->signal[i];
+    mhi_signal *s = &signals->signal[MHI_N_SIGNALS + i];
+    if (s->n_y == 0) {
+        *s = (mhi_signal){.name = of->name,
+                          .unit = of->unit,
+                          .n_y = of->n_y,
+                          .offset = signals->n_y + signals->n_carried,
+                          .column = signals->n_z + signals->n_carried,
+                          .scale = i == MHI_SIGNAL_MUSCLE_FORCE      ? USUAL_FORCE
+                                   : i == MHI_SIGNAL_JOINT_MOMENT    ? USUAL_MOMENT
+                                   : i == MHI_SIGNAL_RESIDUAL_TORQUE ? USUAL_MOMENT
+                                                                     : 1};
+        signals->n_carried += s->n_y;
+    }
+    return MHI_N_SIGNALS + i;
 }
 
 static void fill_nan(double *y, int32_t n) {

@@ -3,7 +3,11 @@
  *
  * z = [x; u] is a node's point. Each signal depends on one contiguous range of z: either y_i =
  * z[column + i] or a dense block of `n_columns` columns. All signals of a problem lie one after the
- * other in a vector of n_y values; targets have the same layout. */
+ * other in a vector of n_y values; targets have the same layout.
+ *
+ * A cost may read a signal of the node before. Its value is carried along then as state of the
+ * problem, m_{k+1} = y(x_k, u_k): row MHI_N_SIGNALS + i of the table is signal i of the node
+ * before, with one column of z an entry, and z = [x; u; m]. Solvers see [x; m] as the state. */
 #ifndef MHI_SIGNALS_H
 #define MHI_SIGNALS_H
 
@@ -29,15 +33,22 @@ typedef struct mhi_signal {
     int32_t n_columns; /* of the dense block; 0: y_i = z[column + i] */
     int32_t reads_u;   /* has no value at the last node */
     int32_t jacobian;  /* offset of its dense block in the node's Jacobian store */
+    double scale;      /* y_i = scale z[column + i]: what is carried is of the size of 1, as other
+                        * states; else 1 */
 } mhi_signal;
 
 typedef struct mhi_signals {
-    mhi_signal signal[MHI_N_SIGNALS];
-    int32_t n_y;        /* of all signals */
-    int32_t n_jacobian; /* doubles of the Jacobian store */
+    mhi_signal signal[2 * MHI_N_SIGNALS]; /* the second half: of the node before, n_y = 0 where not
+                                           * carried */
+    int32_t n_y;                          /* of all signals */
+    int32_t n_jacobian;                   /* doubles of the Jacobian store */
+    int32_t n_z;                          /* [x; u], where m begins */
+    int32_t n_carried; /* entries of m; they follow the n_y values in the vector of all signals */
 } mhi_signals;
 
 void mhi_signals_layout(const mhi_system *system, mhi_signals *signals);
+/* Signal i of the node before is carried along from now on; its row. */
+int32_t mhi_signals_carry(mhi_signals *signals, int32_t i);
 
 /* Values y [n_y] of the signals in the bit set `wanted` (1 << MHI_SIGNAL_*) at (x, u); u NULL at
  * the last node, where signals that read u become NaN. With `jacobian` [n_jacobian] also their

@@ -6,16 +6,27 @@
 #include <math.h>
 #include <string.h>
 
-static mhe_status check_layout(mhi_term *t, const mhi_signals *signals, mhe_error *err) {
+/* Row of the table that entry i of layout() means; -1: none. */
+static int32_t find_row(const mhe_cost_layout *l, int32_t i, mhi_signals *signals) {
+    const int32_t signal = l->n_signals == 0 ? l->signal : l->signals[i];
+    if (signal < 0 || signal >= MHI_N_SIGNALS || signals->signal[signal].n_y == 0) {
+        return -1;
+    }
+    return l->at[i] == MHE_AT_PREVIOUS ? mhi_signals_carry(signals, signal) : signal;
+}
+
+static mhe_status check_layout(mhi_term *t, mhi_signals *signals, mhe_error *err) {
     const mhe_cost_layout *l = &t->layout;
     t->n_signals = l->n_signals == 0 ? 1 : l->n_signals;
     if (t->n_signals < 0 || t->n_signals > MHE_COST_MAX_SIGNALS) {
         return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gave %d signals", t->id, l->n_signals);
     }
     for (int32_t i = 0; i < t->n_signals; i++) {
-        t->signals[i] = l->n_signals == 0 ? l->signal : l->signals[i];
-        if (t->signals[i] < 0 || t->signals[i] >= MHI_N_SIGNALS ||
-            signals->signal[t->signals[i]].n_y == 0) {
+        if (l->at[i] < MHE_AT_NODE || l->at[i] > MHE_AT_FIRST) {
+            return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gave %d for `at`", t->id, l->at[i]);
+        }
+        t->signals[i] = find_row(l, i, signals);
+        if (t->signals[i] < 0) {
             return mhe_fail(err, MHE_E_PLUGIN, "%s: layout() gave a signal that does not exist",
                             t->id);
         }
@@ -29,7 +40,7 @@ static mhe_status check_layout(mhi_term *t, const mhi_signals *signals, mhe_erro
 }
 
 mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
-                           const mhe_problem *problem, const mhi_signals *signals, mhi_arena *arena,
+                           const mhe_problem *problem, mhi_signals *signals, mhi_arena *arena,
                            mhi_term *t, mhe_error *err) {
     *t = (mhi_term){.ops = setup->plugin->ops,
                     .id = setup->plugin->id,
@@ -48,15 +59,20 @@ mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
         return status;
     }
     t->y_index = MHI_TAKE(arena, int32_t, t->ny);
+    t->y_target = MHI_TAKE(arena, int32_t, t->ny);
     t->y_signal = MHI_TAKE(arena, int32_t, t->ny);
-    if (t->y_index == NULL || t->y_signal == NULL) {
+    t->y_at = MHI_TAKE(arena, int32_t, t->ny);
+    if (!t->y_index || !t->y_target || !t->y_signal || !t->y_at) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     for (int32_t s = 0, j = 0; s < t->n_signals; s++) {
         const mhi_signal *signal = &signals->signal[t->signals[s]];
+        t->elsewhere |= t->layout.at[s] != MHE_AT_NODE;
         for (int32_t i = 0; i < signal->n_y; i++, j++) {
             t->y_index[j] = signal->offset + i;
+            t->y_target[j] = signals->signal[t->signals[s] % MHI_N_SIGNALS].offset + i;
             t->y_signal[j] = t->signals[s];
+            t->y_at[j] = t->layout.at[s];
         }
     }
     t->differenced = t->ops->jacobian == NULL;
@@ -98,7 +114,7 @@ mhe_status mhi_term_workspace_create(const mhi_term *t, int32_t n_z, mhi_arena *
 uint32_t mhi_term_reads(const mhi_term *t) {
     uint32_t reads = 0;
     for (int32_t i = 0; i < t->n_signals; i++) {
-        reads |= 1u << t->signals[i];
+        reads |= 1u << t->signals[i] % MHI_N_SIGNALS;
     }
     return reads;
 }
@@ -179,11 +195,11 @@ static void add_row(const double *row, int32_t first, int32_t n, double r, doubl
 static void add_diagonal(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
                          const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum) {
     for (int32_t j = 0; j < t->ny; j++) {
-        const double r = w->r[j], d = w->jacobian[j];
+        const mhi_signal *s = &signals->signal[t->y_signal[j]];
+        const double r = w->r[j], d = w->jacobian[j] * s->scale;
         if (isnan(r) || d == 0) {
             continue;
         }
-        const mhi_signal *s = &signals->signal[t->y_signal[j]];
         const int32_t i = t->y_index[j] - s->offset;
         if (s->n_columns == 0) {
             const int32_t c = s->column + i;
@@ -205,11 +221,11 @@ static void add_dense(const mhi_term *t, mhi_term_workspace *w, const mhi_signal
         int32_t first = n_z, end = 0;
         memset(w->row, 0, sizeof(double) * (size_t)n_z);
         for (int32_t j = 0; j < t->ny; j++) {
-            const double d = w->jacobian[i * t->ny + j];
+            const mhi_signal *s = &signals->signal[t->y_signal[j]];
+            const double d = w->jacobian[i * t->ny + j] * s->scale;
             if (d == 0) {
                 continue;
             }
-            const mhi_signal *s = &signals->signal[t->y_signal[j]];
             const int32_t row = t->y_index[j] - s->offset;
             const int32_t from = s->n_columns == 0 ? s->column + row : s->column;
             const int32_t to = s->n_columns == 0 ? from + 1 : from + s->n_columns;
@@ -258,7 +274,7 @@ static double robust_loss(const mhi_term *t, mhi_term_workspace *w) {
     const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
     double loss = 0;
     for (int32_t i = 0, n = 1; i < t->layout.n_res; i += n) {
-        n = diagonal && t->y_signal[i] == MHI_SIGNAL_MARKERS ? 3 : 1;
+        n = diagonal && t->y_signal[i] % MHI_N_SIGNALS == MHI_SIGNAL_MARKERS ? 3 : 1;
         const double size = sqrt(squares_of(w->r + i, n));
         const int beyond = size > t->limit;
         const double share = beyond ? sqrt(t->limit / size) : 1;
@@ -280,13 +296,28 @@ static void scale_jacobian(const mhi_term *t, mhi_term_workspace *w) {
     }
 }
 
+/* Entries of the node before have its targets; those of the first node are missing at others. */
+static void gather_elsewhere(const mhi_term *t, mhi_term_workspace *w, int32_t node,
+                             const double *before) {
+    for (int32_t j = 0; j < t->ny; j++) {
+        if (t->y_at[j] == MHE_AT_PREVIOUS) {
+            w->y_ref[j] = before == NULL ? NAN : before[t->y_target[j]];
+        } else if (t->y_at[j] == MHE_AT_FIRST && node > 0) {
+            w->y[j] = w->y_ref[j] = NAN;
+        }
+    }
+}
+
 mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
                         const mhe_stage *node, const double *y, const double *target,
-                        const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum,
-                        mhe_error *err) {
+                        const double *before, const double *jacobian, double scale, int32_t n_z,
+                        mhi_term_sum *sum, mhe_error *err) {
     for (int32_t j = 0; j < t->ny; j++) {
         w->y[j] = y[t->y_index[j]];
-        w->y_ref[j] = target[t->y_index[j]];
+        w->y_ref[j] = target[t->y_target[j]];
+    }
+    if (t->elsewhere) {
+        gather_elsewhere(t, w, node->node, before);
     }
     mhe_stage stage = *node;
     stage.ny = t->ny;

@@ -27,10 +27,13 @@ typedef struct mhi_term {
     double limit;  /* unit of r: beyond it the loss is linear; infinite: nowhere */
     mhe_cost_layout layout;
     int32_t n_signals;
-    int32_t signals[MHE_COST_MAX_SIGNALS];
+    int32_t signals[MHE_COST_MAX_SIGNALS]; /* rows of the table of signals */
     int32_t ny;
     int32_t *y_index;    /* [ny] place in the vector of all signals */
-    int32_t *y_signal;   /* [ny] which signal */
+    int32_t *y_target;   /* [ny] place of its target in the vector of targets */
+    int32_t *y_signal;   /* [ny] which row of the table */
+    int32_t *y_at;       /* [ny] MHE_AT_* */
+    int32_t elsewhere;   /* an entry is of another node than the one in work */
     int32_t differenced; /* no jacobian(): central differences */
 } mhi_term;
 
@@ -44,8 +47,8 @@ typedef struct mhi_term_workspace {
     void *scratch;
 } mhi_term_workspace;
 
-/* Where a term adds its share; derivatives all or none NULL. Row-major, n_z = n_x + n_u (n_x at the
- * last node). */
+/* Where a term adds its share; derivatives all or none NULL. Row-major; z is what signals.h says,
+ * at the last node without u where nothing is carried. */
 typedef struct mhi_term_sum {
     double cost;
     double *gradient; /* [n_z] */
@@ -55,13 +58,13 @@ typedef struct mhi_term_sum {
 /* Creates the plugin's instance and lays it out. `problem` and `signals` must outlive the term.
  * [cold] */
 mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
-                           const mhe_problem *problem, const mhi_signals *signals, mhi_arena *arena,
+                           const mhe_problem *problem, mhi_signals *signals, mhi_arena *arena,
                            mhi_term *term, mhe_error *err);
 void mhi_term_destroy(mhi_term *term);
 mhe_status mhi_term_workspace_create(const mhi_term *term, int32_t n_z, mhi_arena *arena,
                                      mhi_term_workspace *workspace, mhe_error *err);
 
-/* Bit set of the signals it reads. */
+/* Bit set of the signals it reads, of this node or the one before. */
 uint32_t mhi_term_reads(const mhi_term *term);
 /* Marks in pattern [n_z x n_z] what its Gauss-Newton Hessian can fill; `columns` [n_z] is scratch.
  */
@@ -72,12 +75,13 @@ void mhi_term_pattern(const mhi_term *term, const mhi_signals *signals, int32_t 
  * Huber's: limit (|r| - limit/2) (Huber 1964, doi:10.1214/aoms/1177703732), where |r| is a marker's
  * distance (three rows) or one row. Its gradient is exact; its Gauss-Newton Hessian is that of the
  * squares with weight limit / |r|, without the part along r that would make it smaller:
- * iteratively reweighted least squares, positive semidefinite. `y`, `target` [signals->n_y],
- * `jacobian` as from mhi_signals_evaluate. Rows that are NaN because data or signals are missing
- * drop out. [hot] */
+ * iteratively reweighted least squares, positive semidefinite. `y` are all
+ * signals, those of the node before behind them; `target` those of this node, `before` of the one
+ * before (NULL: there is none), `jacobian` as from mhi_signals_evaluate. Rows that are NaN because
+ * data or signals are missing drop out. [hot] */
 mhe_status mhi_term_add(const mhi_term *term, mhi_term_workspace *workspace,
                         const mhi_signals *signals, const mhe_stage *node, const double *y,
-                        const double *target, const double *jacobian, double scale, int32_t n_z,
-                        mhi_term_sum *sum, mhe_error *err);
+                        const double *target, const double *before, const double *jacobian,
+                        double scale, int32_t n_z, mhi_term_sum *sum, mhe_error *err);
 
 #endif

@@ -113,7 +113,7 @@ static void test_refused(void **state) {
         cost_rig_open(&rig, HIGH, "tracked: [Biceps, triceps]", MHE_FORMULATION_EXCITATION, 0),
         MHE_E_CONFIG);
     assert_string_equal(rig.err.text,
-                        "tracked: the model has no muscle 'triceps' (it has Biceps, Triceps, "
+                        "tracked: 'excitation' has no entry 'triceps' (it has Biceps, Triceps, "
                         "Deltoid)");
     const char *nothing = "{markers: 0, emg: 0, q: 0, qdot: 0, activation: 0}";
     assert_int_equal(cost_rig_open(&rig, HIGH, nothing, MHE_FORMULATION_EXCITATION, 0),

@@ -90,9 +90,13 @@ static void test_refused(void **state) {
         {"{signal: posture}", "the problem has no signal 'posture'", MHE_FORMULATION_EXCITATION},
         {"{signal: excitation}", "the problem has no signal 'excitation'",
          MHE_FORMULATION_ACTIVATION},
-        {"{signal: activation, of: [biceps]}", "of: the model has no muscle 'biceps'", 0},
-        {"{signal: q, of: [Biceps]}", "of: the model has no coordinate 'Biceps'", 0},
-        {"{signal: markers, of: [HEAD]}", "of: the model has no marker 'HEAD'", 0},
+        {"{signal: activation, of: [biceps]}",
+         "of: 'activation' has no entry 'biceps' (it has Biceps, Triceps, Deltoid)", 0},
+        {"{signal: q, of: [Biceps]}", "of: 'q' has no entry 'Biceps' (it has shoulder, elbow)", 0},
+        {"{signal: markers, of: [HEAD]}",
+         "of: 'markers' has no entry 'HEAD' (it has EPI.x, EPI.y, EPI.z, WRIST.x, WRIST.y, "
+         "WRIST.z)",
+         0},
         {"{signal: activation, value: [0, 0]}", "value: 2 values; 'activation' has 3 entries", 0},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
