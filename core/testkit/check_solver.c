@@ -2,6 +2,7 @@
 /* check_solver.c: a cart (double integrator) that is to reach a place, with a thruster too weak to
  * do it freely: linear dynamics, quadratic cost, active bounds, so the optimality conditions of
  * solver.h decide alone. */
+#include "dense_covariance.h"
 #include "kit.h"
 
 #include <math.h>
@@ -254,6 +255,37 @@ static void check_refusal(mhi_kit *kit, solver_case *s, cart *c) {
     }
 }
 
+/* From a start so near that the way is not all bounds; a solver that has none says so by NULL. */
+static void check_covariance(mhi_kit *kit, solver_case *s, cart *c) {
+    const char *check = "covariance against a dense inverse";
+    iterate w = {0};
+    mhe_solve_info info;
+    mhe_error err = {0};
+    mhi_dense dense;
+    if (s->ops->covariance == NULL) {
+        mhi_kit_note(kit, check, "none can be had");
+        return;
+    }
+    set_bounds(c, 0.75);
+    if (!solve(kit, s, NULL, &w, 0, &info, check)) {
+        return;
+    }
+    const mhe_solution at = view(&w, 1);
+    if (!mhi_dense_make(s->problem, &at, &dense)) {
+        mhi_kit_fail(kit, check, "the dense system is singular");
+    } else if (dense.n_gone_u == 0) {
+        mhi_kit_fail(kit, check, "no force is at its bound");
+    } else {
+        const double worst = mhi_dense_compare(&dense, s->ops, s->self, &err);
+        if (isnan(worst)) {
+            mhi_kit_fail(kit, check, "%s", err.text);
+        } else {
+            (void)mhi_kit_limit(kit, check, worst, 1e-4); /* bounds of later states may be held */
+        }
+    }
+    mhi_dense_free(&dense);
+}
+
 static void check_solves(mhi_kit *kit, solver_case *s, cart *c) {
     mhe_solve_info first, second;
     iterate w = {0}, again = {0};
@@ -282,6 +314,7 @@ static void check_solves(mhi_kit *kit, solver_case *s, cart *c) {
         (void)mhi_kit_limit(kit, "the first state is where its bounds are", fabs(w.x[0] - 0.2),
                             1e-6);
     }
+    check_covariance(kit, s, c);
 }
 
 void mhi_check_solver(mhi_kit *kit) {

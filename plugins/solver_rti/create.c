@@ -63,6 +63,12 @@ static void place(rti_solver *s, block *b) {
     for (size_t i = 0; i < sizeof of_z / sizeof of_z[0]; i++) {
         *of_z[i] = cut_doubles(b, z);
     }
+    const size_t n_x = (size_t)shape->n_x, n_u = (size_t)shape->n_u;
+    s->result = cut_doubles(b, z);
+    s->spread = cut_doubles(b, n_stages * n_x * (size_t)shape->ld_x);
+    s->gain = cut_doubles(b, n_u * (size_t)shape->ld_x);
+    s->rest = cut_doubles(b, n_u * (size_t)shape->ld_z);
+    s->joint = cut_doubles(b, (n_x + n_u) * (size_t)shape->ld_z);
     s->lambda = cut_doubles(b, x);
     s->gaps = cut_doubles(b, x);
     s->stage_cost = cut_doubles(b, n_stages);

@@ -43,7 +43,8 @@ static const mhe_solver_ops rti_ops = {.size = sizeof rti_ops,
                                        .create = rti_create,
                                        .destroy = rti_destroy,
                                        .solve = rti_solve,
-                                       .prepare = rti_prepare};
+                                       .prepare = rti_prepare,
+                                       .covariance = rti_covariance};
 
 static const mhe_plugin rti_plugin = {
     .size = sizeof rti_plugin,

@@ -231,3 +231,79 @@ void riccati_solve(riccati *r, const qp_stage *stages, const double *g, const do
     }
     memset(row_z(s, w, s->N), 0, sizeof(double) * (size_t)s->n_u);
 }
+
+#define ROUNDING 1e-13 /* of a pivot, part of what its row and column began with */
+
+/* U [n x ld] of a Cholesky factorisation, with the inverse of its diagonal. */
+static int32_t is_rounding(const uint8_t *fixed, int32_t n, const double *U, int32_t ld,
+                           const double *inverse) {
+    for (int32_t i = 0; i < n; i++) {
+        double diagonal = 0;
+        for (int32_t j = 0; j < i; j++) {
+            diagonal += U[j * ld + i] * U[j * ld + i];
+        }
+        const double pivot = 1 / (inverse[i] * inverse[i]);
+        if (!fixed[i] && !(pivot > ROUNDING * (diagonal + pivot))) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+int32_t riccati_is_singular(const riccati *r) {
+    const qp_shape *s = r->shape;
+    for (int32_t k = 0; k < s->N; k++) {
+        if (is_rounding(r->fixed + (ptrdiff_t)k * s->ld_z, s->n_u, M_of(r, k), s->ld_z,
+                        inverse_of(r, k))) {
+            return 1;
+        }
+    }
+    return !r->first_is_fixed &&
+           is_rounding(r->fixed + s->n_u, s->n_x, r->first, s->ld_x, r->first_inverse);
+}
+
+/* Column i of (U^T U)^-1, in w; m is scratch, both with room for a row. */
+static void inverse_column(const qp_shape *s, int32_t i, int32_t n, const double *U, int32_t ld,
+                           const double *inverse, double *m, double *w) {
+    memset(m, 0, sizeof(double) * (size_t)ld);
+    m[i] = -1;
+    s->kernels->substitute(n, n, U, ld, inverse, m);
+    s->kernels->substitute_back(n, U, ld, inverse, m, w);
+}
+
+void riccati_gain(riccati *r, int32_t k, double *K, double *rest) {
+    const qp_shape *s = r->shape;
+    const double *M = M_of(r, k), *inverse = inverse_of(r, k);
+    const uint8_t *fixed = r->fixed + (ptrdiff_t)k * s->ld_z;
+    double *m = row_z(s, r->y, 0), *w = row_z(s, r->y, 1);
+    memset(K, 0, sizeof(double) * (size_t)(s->n_u * s->ld_x));
+    memset(rest, 0, sizeof(double) * (size_t)(s->n_u * s->ld_z));
+    for (int32_t j = 0; j < s->n_x && !(k == 0 && r->first_is_fixed); j++) {
+        memset(m, 0, sizeof(double) * (size_t)s->ld_z);
+        for (int32_t i = 0; i < s->n_u; i++) {
+            m[i] = M[i * s->ld_z + s->n_u + j];
+        }
+        s->kernels->substitute_back(s->n_u, M, s->ld_z, inverse, m, w);
+        for (int32_t i = 0; i < s->n_u; i++) {
+            K[i * s->ld_x + j] = w[i];
+        }
+    }
+    for (int32_t j = 0; j < s->n_u; j++) {
+        if (!fixed[j]) {
+            inverse_column(s, j, s->n_u, M, s->ld_z, inverse, m, w);
+            memcpy(rest + j * s->ld_z, w, sizeof(double) * (size_t)s->n_u);
+        }
+    }
+}
+
+void riccati_first(riccati *r, double *covariance) {
+    const qp_shape *s = r->shape;
+    double *m = row_z(s, r->y, 0), *w = row_z(s, r->y, 1);
+    memset(covariance, 0, sizeof(double) * (size_t)(s->n_x * s->ld_x));
+    for (int32_t j = 0; j < s->n_x && !r->first_is_fixed; j++) {
+        if (!r->fixed[s->n_u + j]) {
+            inverse_column(s, j, s->n_x, r->first, s->ld_x, r->first_inverse, m, w);
+            memcpy(covariance + j * s->ld_x, w, sizeof(double) * (size_t)s->n_x);
+        }
+    }
+}

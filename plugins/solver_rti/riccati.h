@@ -38,4 +38,19 @@ int32_t riccati_factor(riccati *r, const qp_stage *stages, const double *diagona
 void riccati_solve(riccati *r, const qp_stage *stages, const double *g, const double *b, double *w,
                    double *lambda);
 
+/* ---- covariances, of what riccati_factor() factorised ----
+ *
+ * exp(-1/2 w^T H w) on the dynamics is a Gaussian, and leaving out what comes after a stage is
+ * minimising over it. So the recursion backwards says what of u_k is left where x_k is known, u_k =
+ * K_k x_k + noise of covariance M_uu^-1, and a second one forwards collects it from the first state
+ * on, whose covariance is P_0^-1 (Rauch, Tung and Striebel 1965, doi:10.2514/3.3166, the other way
+ * round). What is fixed has none. */
+
+/* Is a pivot so small beside its diagonal element that it is rounding? */
+int32_t riccati_is_singular(const riccati *r);
+/* K [n_u x ld_x] and the symmetric M_uu^-1 [n_u x ld_z] of stage k. */
+void riccati_gain(riccati *r, int32_t k, double *K, double *rest);
+/* Covariance of the first state [n_x x ld_x]. */
+void riccati_first(riccati *r, double *covariance);
+
 #endif

@@ -66,6 +66,10 @@ typedef struct rti_solver {
     double *lower, *upper;              /* [size_z] of w */
     double *lambda, *z_lower, *z_upper; /* at `here` */
     double *slope, *gaps;               /* scratch [size_z], [size_x] */
+    double *result;                     /* [size_z] w of the last solve */
+    int32_t has_result;                 /* it gave one; 2: its covariances are known */
+    double *spread;                     /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
+    double *gain, *rest, *joint;        /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
     rti_pool *pool;
     rti_worker *workers;      /* [n_workers of the problem] */
     double *stage_cost;       /* [N+1] of the last evaluation, not scaled */
@@ -131,6 +135,9 @@ mhe_status rti_create(const mhe_host *host, const mhe_stage_problem *problem, co
                       void **self, mhe_error *err);
 void rti_destroy(void *self);
 double rti_now(void); /* s of CLOCK_MONOTONIC */
+
+/* covariance.c */
+mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err);
 
 /* sqp.c */
 mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err);

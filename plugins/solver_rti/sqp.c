@@ -179,6 +179,8 @@ static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info)
     const rti_leap *leap = &s->leap;
     scatter(&s->shape, s->here.w, out->x, out->u);
     write_multipliers(s, out);
+    memcpy(s->result, s->here.w, sizeof(double) * size_z(&s->shape));
+    s->has_result = 1;
     info->objective = (leap->taken ? leap->cost : s->here.cost) / s->scale;
     info->kkt_residual = worst(&s->residuals);
     info->primal_residual = leap->taken ? fmax(leap->first_gap, leap->left) : largest_gap(s);
@@ -275,6 +277,7 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
                              .objective = NAN,
                              .kkt_residual = INFINITY,
                              .primal_residual = INFINITY};
+    s->has_result = 0;
     if (!read_bounds(s, &n_free)) {
         info->outcome = MHE_SOLVE_INFEASIBLE;
         return MHE_OK;

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* covariance.c: how well the costs determine the solution. */
+#include "rti.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Weight that holds a later state at its bound, beside the largest curvature of the costs. */
+#define STIFF 1e10
+
+/* Is the variable at a bound that its multiplier keeps it at? Of the two, at a solution the one
+ * that is 0 is the smaller. */
+static int32_t at_bound(const rti_solver *s, ptrdiff_t i) {
+    const double below = s->result[i] - s->lower[i], above = s->upper[i] - s->result[i];
+    return s->lower[i] == s->upper[i] || s->scale * s->z_lower[i] > below ||
+           s->scale * s->z_upper[i] > above;
+}
+
+static double largest_curvature(const rti_solver *s) {
+    double largest = 0;
+    for (int32_t k = 0; k <= s->shape.N; k++) {
+        for (int32_t i = 0; i < s->shape.n_z; i++) {
+            largest = fmax(largest, s->trial.stages[k].H[i * s->shape.ld_z + i]);
+        }
+    }
+    return largest;
+}
+
+/* What is at its bound is no variable: controls and the first state are constants, later states are
+ * held. The diagonal that does so. */
+static void hold(rti_solver *s) {
+    const qp_shape *shape = &s->shape;
+    qp *q = &s->qp;
+    const double stiff = STIFF * largest_curvature(s);
+    memset(q->diagonal, 0, sizeof(double) * size_z(shape));
+    memset(q->fixed, 0, size_z(shape));
+    for (int32_t k = 0; k <= shape->N; k++) {
+        for (int32_t i = k < shape->N ? 0 : shape->n_u; i < shape->n_z; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * shape->ld_z + i;
+            if (!at_bound(s, at)) {
+                continue;
+            }
+            if (k == 0 || i < shape->n_u) {
+                q->fixed[at] = 1;
+            } else {
+                q->diagonal[at] = stiff;
+            }
+        }
+    }
+    riccati_read_fixed(&q->riccati);
+}
+
+/* Covariance of (u_k, x_k) from that of x_k -> s->joint. */
+static void join(rti_solver *s, int32_t k) {
+    const qp_shape *shape = &s->shape;
+    const int32_t n_x = shape->n_x, n_u = shape->n_u, ld = shape->ld_z, ld_x = shape->ld_x;
+    const double *xx = s->spread + (ptrdiff_t)k * n_x * ld_x;
+    riccati_gain(&s->qp.riccati, k, s->gain, s->rest);
+    memset(s->joint, 0, sizeof(double) * (size_t)(shape->n_z * ld));
+    for (int32_t i = 0; i < n_x; i++) {
+        memcpy(s->joint + (n_u + i) * ld + n_u, xx + i * ld_x, sizeof(double) * (size_t)n_x);
+    }
+    for (int32_t i = 0; i < n_u; i++) {
+        for (int32_t j = 0; j < n_x; j++) { /* K xx */
+            double sum = 0;
+            for (int32_t l = 0; l < n_x; l++) {
+                sum += s->gain[i * ld_x + l] * xx[l * ld_x + j];
+            }
+            s->joint[i * ld + n_u + j] = s->joint[(n_u + j) * ld + i] = sum;
+        }
+    }
+    for (int32_t i = 0; i < n_u; i++) {
+        for (int32_t j = 0; j <= i; j++) { /* K xx K^T + M_uu^-1 */
+            double sum = s->rest[i * ld + j];
+            for (int32_t l = 0; l < n_x; l++) {
+                sum += s->joint[i * ld + n_u + l] * s->gain[j * ld_x + l];
+            }
+            s->joint[i * ld + j] = s->joint[j * ld + i] = sum;
+        }
+    }
+}
+
+/* Covariance of x_{k+1} = F_k w_k from s->joint, which becomes F joint row by row. */
+static void carry_on(rti_solver *s, int32_t k) {
+    const qp_shape *shape = &s->shape;
+    const qp_stage *stage = &s->trial.stages[k];
+    const int32_t n_x = shape->n_x, n_z = shape->n_z;
+    double *next = s->spread + (ptrdiff_t)(k + 1) * n_x * shape->ld_x;
+    double *column = s->gaps, *rows = s->qp.rest_w; /* [n_x], [n_x x ld_z] a row at a time */
+    for (int32_t i = 0; i < n_z; i++) {             /* joint F^T, in the first n_x columns */
+        double *row = s->joint + i * shape->ld_z;
+        memset(column, 0, sizeof(double) * (size_t)shape->ld_x);
+        qp_forward(shape, stage, row, column);
+        memcpy(row, column, sizeof(double) * (size_t)n_x);
+    }
+    for (int32_t j = 0; j < n_x; j++) {
+        memset(rows, 0, sizeof(double) * (size_t)shape->ld_z);
+        for (int32_t i = 0; i < n_z; i++) {
+            rows[i] = s->joint[i * shape->ld_z + j];
+        }
+        memset(next + j * shape->ld_x, 0, sizeof(double) * (size_t)shape->ld_x);
+        qp_forward(shape, stage, rows, next + j * shape->ld_x);
+    }
+}
+
+static mhe_status find(rti_solver *s, mhe_error *err) {
+    const qp_shape *shape = &s->shape;
+    s->err = err;
+    memcpy(s->trial.w, s->result, sizeof(double) * size_z(shape));
+    if (!rti_evaluate(s, &s->trial, RTI_ALL)) {
+        return s->failure != MHE_OK
+                   ? s->failure
+                   : mhe_fail(err, MHE_E_NUMERIC, "the result of the solve has no value");
+    }
+    hold(s);
+    if (!riccati_factor(&s->qp.riccati, s->trial.stages, s->qp.diagonal) ||
+        riccati_is_singular(&s->qp.riccati)) {
+        return mhe_fail(err, MHE_E_NUMERIC,
+                        "the costs do not determine the solution: their Hessian is singular");
+    }
+    riccati_first(&s->qp.riccati, s->spread);
+    for (int32_t k = 0; k < shape->N; k++) {
+        join(s, k);
+        carry_on(s, k);
+    }
+    s->has_result = 2;
+    return MHE_OK;
+}
+
+/* [rows x columns] of a block of s->joint, of the caller's objective. */
+static void give(const rti_solver *s, const double *from, int32_t ld, int32_t rows, int32_t columns,
+                 double *to) {
+    for (int32_t i = 0; i < rows && to != NULL; i++) {
+        for (int32_t j = 0; j < columns; j++) {
+            to[i * columns + j] = s->scale * from[i * ld + j];
+        }
+    }
+}
+
+mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err) {
+    rti_solver *s = self;
+    const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, ld = s->shape.ld_z;
+    if (!s->has_result || out->node < 0 || out->node > s->shape.N) {
+        return mhe_fail(err, MHE_E_ARGUMENT,
+                        s->has_result ? "there is no such node" : "there is no result of a solve");
+    }
+    const mhe_status status = s->has_result == 2 ? MHE_OK : find(s, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    give(s, s->spread + (ptrdiff_t)out->node * n_x * s->shape.ld_x, s->shape.ld_x, n_x, n_x,
+         out->xx);
+    if (out->node < s->shape.N && (out->ux != NULL || out->uu != NULL)) {
+        join(s, out->node);
+        give(s, s->joint + n_u, ld, n_u, n_x, out->ux);
+        give(s, s->joint, ld, n_u, n_u, out->uu);
+    }
+    return MHE_OK;
+}
