@@ -2,8 +2,8 @@
 #include "arguments.h"
 
 #include "console.h"
-#include "plugin/registry.h"
 
+#include <mhe/library.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -60,9 +60,9 @@ static mhe_status take_word(int argc, char **argv, int *i, arguments *a, mhe_err
     } else if (strcmp(word, "--list-plugins") == 0) {
         a->mode = MODE_LIST;
     } else if (strcmp(word, "--json") == 0) {
-        a->format = MHI_FORMAT_JSON;
+        a->format = MHE_FORMAT_JSON;
     } else if (strcmp(word, "--markdown") == 0) {
-        a->format = MHI_FORMAT_MARKDOWN;
+        a->format = MHE_FORMAT_MARKDOWN;
     } else if (strcmp(word, "--version") == 0) {
         a->mode = MODE_VERSION;
     } else if (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0) {

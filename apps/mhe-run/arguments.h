@@ -17,7 +17,7 @@ typedef struct arguments {
     int quiet;
     int realtime;
     int trust;          /* a config may name folders of plugins */
-    int32_t format;     /* MHI_FORMAT_* */
+    int32_t format;     /* MHE_FORMAT_* */
     const char *config; /* run, check */
     const char *id;     /* describe */
     const char *out;    /* NULL: ./out/<config name> */

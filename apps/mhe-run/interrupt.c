@@ -2,6 +2,7 @@
 #include "interrupt.h"
 
 #include <signal.h>
+#include <stdatomic.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -16,6 +17,7 @@ static const int signals[] = {SIGINT, SIGTERM, SIGALRM};
 static atomic_int asked, asked_at_last;
 static atomic_llong heard; /* the last that was no echo, ns of CLOCK_MONOTONIC */
 static const mhe_outbox *outbox;
+static mhe_estimator *estimator;
 static struct sigaction before[N_SIGNALS];
 
 /* Only what a signal handler may call. */
@@ -49,6 +51,7 @@ static void on_signal(int number) {
         leave();
     }
     asked = 1;
+    mhe_estimator_stop(estimator, 1);
     (void)alarm(INTERRUPT_GRACE);
 }
 
@@ -75,13 +78,14 @@ static void handle(void (*handler)(int), struct sigaction *old) {
     }
 }
 
-void interrupt_begin(const mhe_outbox *files) {
+void interrupt_begin(const mhe_outbox *files, mhe_estimator *solving) {
     outbox = files;
+    estimator = solving;
     handle(on_signal, before);
 }
 
-const atomic_int *interrupt_asked(void) {
-    return &asked;
+int32_t interrupt_asked(void) {
+    return asked;
 }
 
 void interrupt_settle(void) {

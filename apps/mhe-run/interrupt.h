@@ -8,16 +8,15 @@
 #ifndef INTERRUPT_H
 #define INTERRUPT_H
 
+#include <mhe/estimator.h>
 #include <mhe/outbox.h>
-
-#include <stdatomic.h>
 
 #define INTERRUPT_GRACE 2 /* s */
 
-/* From here on signals ask. `outbox` is lent, its files do not change until interrupt_settle. */
-void interrupt_begin(const mhe_outbox *outbox);
-/* Not 0: asked to end. */
-const atomic_int *interrupt_asked(void);
+/* From here on signals ask, and stop the estimator. Both are lent; the outbox's files do not change
+ * until interrupt_settle, and after it the estimator is left alone. */
+void interrupt_begin(const mhe_outbox *outbox, mhe_estimator *estimator);
+int32_t interrupt_asked(void); /* to end */
 /* The frames are done, the files are being written: this is brief and is not broken off, but by a
  * second signal. */
 void interrupt_settle(void);

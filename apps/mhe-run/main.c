@@ -4,49 +4,50 @@
 #include "console.h"
 #include "track.h"
 
-#include <mhe/version.h>
+#include <mhe/library.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static mhe_status show_plugins(const arguments *a, mhi_registry *registry, mhe_error *err) {
-    mhi_text text = {0};
-    if (a->mode == MODE_LIST) {
-        mhi_registry_list(registry, a->format, &text);
-        return console_print(&text, err);
+static mhe_status show_plugins(const arguments *a, const mhe_host *host, mhe_error *err) {
+    char *text = NULL;
+    mhe_status status = a->mode == MODE_LIST
+                            ? mhe_plugins_list(host, a->format, &text, err)
+                            : mhe_plugins_describe(host, a->id, a->format, &text, err);
+    if (status == MHE_OK && fputs(text, stdout) == EOF) {
+        status = mhe_fail(err, MHE_E_IO, "the output could not be written");
     }
-    if (strcmp(a->id, "config") == 0) {
-        mhi_run_describe(a->format, &text);
-        return console_print(&text, err);
-    }
-    mhe_status status = mhi_registry_describe(registry, a->id, a->format, &text, err);
-    if (status != MHE_OK) {
-        mhi_text_free(&text);
-        return status;
-    }
-    return console_print(&text, err);
+    mhe_free(text);
+    return status;
 }
 
-static mhe_status run_config(const arguments *a, const mhe_host *host, mhi_registry *registry,
-                             mhe_error *err) {
-    mhi_run *run = NULL;
-    mhe_status status = mhi_run_read(a->config, a->set, a->n_set, registry, &run, err);
+static mhe_status run_config(const arguments *a, const mhe_host *host, mhe_error *err) {
+    mhe_config *config = NULL;
+    mhe_status status = mhe_config_read(a->config, a->set, a->n_set,
+                                        a->trust ? MHE_CONFIG_TRUST : 0, host, &config, err);
     if (status != MHE_OK) {
         return status;
     }
     char folder[4096];
-    int length = a->out != NULL ? snprintf(folder, sizeof folder, "%s", a->out)
-                                : snprintf(folder, sizeof folder, "out/%s", run->name);
+    int length = a->out != NULL
+                     ? snprintf(folder, sizeof folder, "%s", a->out)
+                     : snprintf(folder, sizeof folder, "out/%s", mhe_config_name(config));
     if (length < 0 || (size_t)length >= sizeof folder) {
         status = mhe_fail(err, MHE_E_ARGUMENT, "the path of the output folder is too long");
     } else {
-        const track_setup setup = {run, host, folder, a->quiet, a->mode == MODE_CHECK, a->realtime};
+        const track_setup setup = {.path = a->config,
+                                   .config = config,
+                                   .host = host,
+                                   .out = folder,
+                                   .quiet = a->quiet,
+                                   .check_only = a->mode == MODE_CHECK,
+                                   .realtime = a->realtime};
         status = track(&setup, err);
     }
     if (status == MHE_OK && a->mode == MODE_CHECK) {
         (void)printf("%s: ok\n", a->config);
     }
-    mhi_run_free(run);
+    mhe_config_close(config);
     return status;
 }
 
@@ -54,22 +55,15 @@ int main(int argc, char **argv) {
     const mhe_host host = console_host("mhe-run");
     arguments a;
     mhe_error err = {0};
-    mhi_registry *registry = NULL;
     mhe_status status = arguments_parse(argc, argv, &a, &err);
     if (status == MHE_OK && a.mode == MODE_HELP) {
         (void)fputs(arguments_help, stdout);
     } else if (status == MHE_OK && a.mode == MODE_VERSION) {
-        (void)printf("mhe-run %s\n", MHE_VERSION);
+        (void)printf("mhe-run %s\n", mhe_version());
     } else if (status == MHE_OK) {
-        status = mhi_registry_create(&host, &registry, &err);
-        if (status == MHE_OK) {
-            mhi_registry_trust_files(registry, a.trust);
-            status = a.mode == MODE_LIST || a.mode == MODE_DESCRIBE
-                         ? show_plugins(&a, registry, &err)
-                         : run_config(&a, &host, registry, &err);
-        }
+        status = a.mode == MODE_LIST || a.mode == MODE_DESCRIBE ? show_plugins(&a, &host, &err)
+                                                                : run_config(&a, &host, &err);
     }
-    mhi_registry_free(registry);
     free(a.set);
     return console_end("mhe-run", status, &err);
 }

@@ -2,27 +2,27 @@
 /* picture.c: what of a run is shown. */
 #include "picture.h"
 
+#include "base/pi.h"
 #include "figure.h"
-#include "io/table.h"
+#include "rows.h"
 
 #include <string.h>
 
-#define DEGREES (180 / 3.14159265358979323846)
 #define ANGLES_MAX 12
 #define FORCES_MAX 8
 
 typedef struct picture {
-    const mhi_table *estimates, *forces;
-    const mhi_table *reference; /* or NULL */
+    const rows *estimates, *forces;
+    const rows *reference; /* or NULL */
     figure figure;
 } picture;
 
-static void add_series(figure_panel *panel, const mhi_table *t, int32_t column, double scale,
+static void add_series(figure_panel *panel, const rows *t, int32_t column, double scale,
                        int32_t style) {
-    panel->series[panel->n_series++] = (figure_series){.time = t->time,
-                                                       .values = t->values + column,
-                                                       .n = t->n_rows,
-                                                       .stride = t->n_columns,
+    panel->series[panel->n_series++] = (figure_series){.time = t->is.time,
+                                                       .values = t->is.values + column,
+                                                       .n = t->is.n_rows,
+                                                       .stride = t->is.n_columns,
                                                        .scale = scale,
                                                        .style = style};
 }
@@ -36,31 +36,31 @@ static figure_panel *add_panel(picture *p, figure_block *block, const char *name
 
 /* The coordinates: columns q_<name> of the estimates, as many as there is room for. */
 static void choose_angles(picture *p, figure_block *block) {
-    const mhi_table *t = p->estimates;
+    const rows *t = p->estimates;
     *block = (figure_block){.heading = "Joint angles", .axis = "angle (°)", .least = 0.1};
-    for (int32_t i = 0; i < t->n_labels && block->n_panels < ANGLES_MAX; i++) {
-        if (strncmp(t->labels[i], "q_", 2) != 0) {
+    for (int32_t i = 0; i < t->is.n_labels && block->n_panels < ANGLES_MAX; i++) {
+        if (strncmp(t->is.labels[i], "q_", 2) != 0) {
             continue;
         }
-        figure_panel *panel = add_panel(p, block, t->labels[i] + 2);
-        add_series(panel, t, i, DEGREES, FIGURE_MADE);
+        figure_panel *panel = add_panel(p, block, t->is.labels[i] + 2);
+        add_series(panel, t, i, MHI_DEGREES, FIGURE_MADE);
         if (p->reference != NULL) {
             char numbered[16];
             (void)snprintf(numbered, sizeof numbered, "q%d", block->n_panels - 1);
-            int32_t column = mhi_table_find(p->reference, t->labels[i]);
-            column = column >= 0 ? column : mhi_table_find(p->reference, numbered);
+            int32_t column = mhe_table_find(p->reference->table, t->is.labels[i]);
+            column = column >= 0 ? column : mhe_table_find(p->reference->table, numbered);
             if (column >= 0) {
-                add_series(panel, p->reference, column, p->reference->in_degrees ? 1 : DEGREES,
-                           FIGURE_TRUE);
+                add_series(panel, p->reference, column,
+                           p->reference->is.in_degrees ? 1 : MHI_DEGREES, FIGURE_TRUE);
             }
         }
     }
 }
 
-static double largest(const mhi_table *t, int32_t column) {
+static double largest(const rows *t, int32_t column) {
     double most = 0;
-    for (int32_t k = 0; k < t->n_rows; k++) {
-        double value = t->values[(size_t)k * (size_t)t->n_columns + (size_t)column];
+    for (int32_t k = 0; k < t->is.n_rows; k++) {
+        double value = t->is.values[(size_t)k * (size_t)t->is.n_columns + (size_t)column];
         most = value > most ? value : most;
     }
     return most;
@@ -68,33 +68,33 @@ static double largest(const mhi_table *t, int32_t column) {
 
 /* The muscles with the largest forces, in the order of the model. */
 static void choose_forces(picture *p, figure_block *block) {
-    const mhi_table *t = p->forces;
+    const rows *t = p->forces;
     *block = (figure_block){
         .heading = "Muscle forces", .axis = "force (N)", .least = 1, .holds_zero = 1};
-    for (int32_t i = 0; i < t->n_labels; i++) {
+    for (int32_t i = 0; i < t->is.n_labels; i++) {
         int32_t stronger = 0;
         double force = largest(t, i);
-        for (int32_t j = 0; j < t->n_labels; j++) {
+        for (int32_t j = 0; j < t->is.n_labels; j++) {
             double other = largest(t, j);
             stronger += other > force || (other == force && j < i);
         }
         if (stronger >= FORCES_MAX) {
             continue;
         }
-        figure_panel *panel = add_panel(p, block, t->labels[i]);
+        figure_panel *panel = add_panel(p, block, t->is.labels[i]);
         add_series(panel, t, i, 1, FIGURE_MADE);
         if (p->reference != NULL) {
             char label[256];
-            (void)snprintf(label, sizeof label, "F_%s", t->labels[i]);
-            int32_t column = mhi_table_find(p->reference, label);
+            (void)snprintf(label, sizeof label, "F_%s", t->is.labels[i]);
+            int32_t column = mhe_table_find(p->reference->table, label);
             if (column >= 0) {
                 add_series(panel, p->reference, column, 1, FIGURE_TRUE);
             }
         }
     }
-    if (block->n_panels < t->n_labels) {
+    if (block->n_panels < t->is.n_labels) {
         (void)snprintf(block->heading, sizeof block->heading,
-                       "Muscle forces: the %d strongest of %d", block->n_panels, t->n_labels);
+                       "Muscle forces: the %d strongest of %d", block->n_panels, t->is.n_labels);
     }
 }
 
@@ -102,8 +102,8 @@ static void compose(picture *p) {
     figure *f = &p->figure;
     *f = (figure){.program = "mhe-run",
                   .name = "estimates",
-                  .begin = p->estimates->time[0],
-                  .end = p->estimates->time[p->estimates->n_rows - 1],
+                  .begin = p->estimates->is.time[0],
+                  .end = p->estimates->is.time[p->estimates->is.n_rows - 1],
                   .n_blocks = 2};
     choose_angles(p, &f->blocks[0]);
     choose_forces(p, &f->blocks[1]);
@@ -115,31 +115,24 @@ static void compose(picture *p) {
     f->legend[f->n_legend++].style = FIGURE_MADE;
 }
 
-static mhe_status read_in(const char *dir, const char *name, mhi_table **table, mhe_error *err) {
-    char path[4096];
-    int n = snprintf(path, sizeof path, "%s/%s", dir, name);
-    if (n < 0 || (size_t)n >= sizeof path) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "%s: the path is too long", dir);
-    }
-    return mhi_sto_read(path, table, err);
-}
-
 mhe_status picture_estimates(const char *dir, const char *reference, mhe_error *err) {
-    mhi_table *estimates = NULL, *forces = NULL, *truth = NULL;
-    mhe_status status = read_in(dir, "estimates.sto", &estimates, err);
+    rows estimates = {0}, forces = {0}, truth = {0};
+    mhe_status status = rows_read_in(dir, "estimates.sto", &estimates, err);
     if (status == MHE_OK) {
-        status = read_in(dir, "forces.sto", &forces, err);
+        status = rows_read_in(dir, "forces.sto", &forces, err);
     }
     if (status == MHE_OK && reference != NULL) {
-        status = mhi_sto_read(reference, &truth, err);
+        status = rows_read(reference, &truth, err);
     }
     if (status == MHE_OK) {
-        picture p = {.estimates = estimates, .forces = forces, .reference = truth};
+        picture p = {.estimates = &estimates,
+                     .forces = &forces,
+                     .reference = reference != NULL ? &truth : NULL};
         compose(&p);
         status = figure_draw(&p.figure, dir, err);
     }
-    mhi_table_free(estimates);
-    mhi_table_free(forces);
-    mhi_table_free(truth);
+    rows_close(&estimates);
+    rows_close(&forces);
+    rows_close(&truth);
     return status;
 }

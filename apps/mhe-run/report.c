@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "report.h"
 
-#include "io/table.h"
-#include <mhe/outbox.h>
+#include "base/pi.h"
+#include "rows.h"
 
 #include <errno.h>
 #include <math.h>
+#include <mhe/outbox.h>
 #include <string.h>
 
 #define WIDTH 300.0
 #define HEIGHT 120.0
 #define POINTS 600 /* of a line; more would not be seen */
-#define DEGREES (180 / 3.14159265358979323846)
 
 /* Text as it may stand in HTML. */
 static void add_escaped(mhi_text *out, const char *text) {
@@ -32,32 +32,32 @@ static void add_escaped(mhi_text *out, const char *text) {
     }
 }
 
-static double value_at(const mhi_table *t, int32_t row, int32_t column, double scale) {
-    return scale * t->values[(ptrdiff_t)row * t->n_columns + column];
+static double value_at(const rows *t, int32_t row, int32_t column, double scale) {
+    return scale * t->is.values[(ptrdiff_t)row * t->is.n_columns + column];
 }
 
-static void widen(const mhi_table *t, int32_t column, double scale, double range[2]) {
-    for (int32_t k = 0; t != NULL && column >= 0 && k < t->n_rows; k++) {
+static void widen(const rows *t, int32_t column, double scale, double range[2]) {
+    for (int32_t k = 0; t != NULL && column >= 0 && k < t->is.n_rows; k++) {
         range[0] = fmin(range[0], value_at(t, k, column, scale)); /* of a number and NaN: it */
         range[1] = fmax(range[1], value_at(t, k, column, scale));
     }
 }
 
 /* A line through the rows of a column; missing values break it. */
-static void add_line(mhi_text *out, const mhi_table *t, int32_t column, double scale,
+static void add_line(mhi_text *out, const rows *t, int32_t column, double scale,
                      const double range[2], const char *style) {
-    const int32_t step = t->n_rows / POINTS + 1;
-    const double span = t->time[t->n_rows - 1] - t->time[0];
+    const int32_t step = t->is.n_rows / POINTS + 1;
+    const double span = t->is.time[t->is.n_rows - 1] - t->is.time[0];
     int open = 0;
     mhi_text_add(out, "<path class=\"%s\" d=\"", style);
-    for (int32_t k = 0; k < t->n_rows; k += step) {
+    for (int32_t k = 0; k < t->is.n_rows; k += step) {
         const double y = value_at(t, k, column, scale);
         if (isnan(y)) {
             open = 0;
             continue;
         }
         mhi_text_add(out, "%c%.1f %.1f", open ? 'L' : 'M',
-                     span > 0 ? WIDTH * (t->time[k] - t->time[0]) / span : 0,
+                     span > 0 ? WIDTH * (t->is.time[k] - t->is.time[0]) / span : 0,
                      HEIGHT * (range[1] - y) / (range[1] - range[0]));
         open = 1;
     }
@@ -65,8 +65,8 @@ static void add_line(mhi_text *out, const mhi_table *t, int32_t column, double s
 }
 
 /* One small picture: a column, and beside it one of a second table (column -1: none). */
-static void add_panel(mhi_text *out, const char *name, const mhi_table *t, int32_t column,
-                      const mhi_table *other, int32_t other_column, double scale, double least) {
+static void add_panel(mhi_text *out, const char *name, const rows *t, int32_t column,
+                      const rows *other, int32_t other_column, double scale, double least) {
     double range[2] = {INFINITY, -INFINITY};
     widen(t, column, scale, range);
     widen(other, other_column, scale, range);
@@ -91,18 +91,18 @@ static void add_panel(mhi_text *out, const char *name, const mhi_table *t, int32
     mhi_text_add(out, "</svg></figure>\n");
 }
 
-static void add_all(mhi_text *out, const char *heading, const mhi_table *t, const char *prefix,
-                    const mhi_table *other, double scale, double least) {
+static void add_all(mhi_text *out, const char *heading, const rows *t, const char *prefix,
+                    const rows *other, double scale, double least) {
     const size_t length = strlen(prefix);
     if (t == NULL) {
         return;
     }
     mhi_text_add(out, "<h2>%s</h2>\n<div>\n", heading);
-    for (int32_t i = 0; i < t->n_labels; i++) {
-        if (strncmp(t->labels[i], prefix, length) == 0) {
-            const char *name = t->labels[i] + length;
-            add_panel(out, name, t, i, other, other == NULL ? -1 : mhi_table_find(other, name),
-                      scale, least);
+    for (int32_t i = 0; i < t->is.n_labels; i++) {
+        if (strncmp(t->is.labels[i], prefix, length) == 0) {
+            const char *name = t->is.labels[i] + length;
+            add_panel(out, name, t, i, other,
+                      other == NULL ? -1 : mhe_table_find(other->table, name), scale, least);
         }
     }
     mhi_text_add(out, "</div>\n");
@@ -117,8 +117,12 @@ static const char head[] =
     ".estimated{stroke:#1f5fa8}.measured{stroke:#d9822b}pre{white-space:pre-wrap}\n"
     "</style>\n";
 
-static void compose(mhi_text *out, const char *name, const char *summary,
-                    mhi_table *const tables[5]) {
+/* NULL where it could not be read. */
+static const rows *shown(const rows *r) {
+    return r->table == NULL ? NULL : r;
+}
+
+static void compose(mhi_text *out, const char *name, const char *summary, const rows *tables) {
     mhi_text_add(out, "%s<title>", head);
     add_escaped(out, name);
     mhi_text_add(out, "</title>\n<h1>");
@@ -127,32 +131,25 @@ static void compose(mhi_text *out, const char *name, const char *summary,
     add_escaped(out, summary);
     mhi_text_add(out,
                  "</pre>\n<p>Blue: estimated. Orange: measured. Time from %.4g to %.4g s.</p>\n",
-                 tables[0]->time[0], tables[0]->time[tables[0]->n_rows - 1]);
-    add_all(out, "Joint coordinates (degrees; of sliders 1/57.3 m)", tables[0], "q_", NULL, DEGREES,
-            1);
-    add_all(out, "Activation against EMG", tables[0], "a_", tables[3], 1, 0.1);
-    add_all(out, "Muscle forces (N)", tables[1], "", NULL, 1, 10);
-    add_all(out, "Distance of markers (mm)", tables[2], "", NULL, 1e3, 1);
-    add_all(out, "Solve time (ms)", tables[4], "solve_", NULL, 1, 1);
+                 tables[0].is.time[0], tables[0].is.time[tables[0].is.n_rows - 1]);
+    add_all(out, "Joint coordinates (degrees; of sliders 1/57.3 m)", shown(&tables[0]), "q_", NULL,
+            MHI_DEGREES, 1);
+    add_all(out, "Activation against EMG", shown(&tables[0]), "a_", shown(&tables[3]), 1, 0.1);
+    add_all(out, "Muscle forces (N)", shown(&tables[1]), "", NULL, 1, 10);
+    add_all(out, "Distance of markers (mm)", shown(&tables[2]), "", NULL, 1e3, 1);
+    add_all(out, "Solve time (ms)", shown(&tables[4]), "solve_", NULL, 1, 1);
 }
 
 mhe_status report_write(const char *dir, const char *name, const char *summary, mhe_error *err) {
     static const char *const files[] = {"estimates.sto", "forces.sto", "marker_residuals.sto",
                                         "emg.sto", "quality.sto"};
-    mhi_table *tables[5] = {NULL};
+    rows tables[5] = {{0}};
     mhi_text page = {0};
     mhe_outbox *outbox = NULL;
-    mhe_status status = MHE_OK;
-    for (int i = 0; i < 5 && status == MHE_OK; i++) {
-        char path[4096];
-        const int n = snprintf(path, sizeof path, "%s/%s", dir, files[i]);
-        if (n < 0 || (size_t)n >= sizeof path) {
-            status = mhe_fail(err, MHE_E_ARGUMENT, "%s: the path is too long", dir);
-        } else if (i == 0) {
-            status = mhi_sto_read(path, &tables[i], err);
-        } else { /* without muscles or markers a table has no columns and cannot be read */
-            (void)mhi_sto_read(path, &tables[i], NULL);
-        }
+    mhe_status status = rows_read_in(dir, files[0], &tables[0], err);
+    for (int i = 1; i < 5 && status == MHE_OK; i++) {
+        /* without muscles or markers a table has no columns and cannot be read */
+        (void)rows_read_in(dir, files[i], &tables[i], NULL);
     }
     if (status == MHE_OK) {
         compose(&page, name, summary, tables);
@@ -168,7 +165,7 @@ mhe_status report_write(const char *dir, const char *name, const char *summary, 
     mhe_outbox_close(outbox);
     mhi_text_free(&page);
     for (int i = 0; i < 5; i++) {
-        mhi_table_free(tables[i]);
+        rows_close(&tables[i]);
     }
     return status;
 }

@@ -101,7 +101,7 @@ static mhe_status open_states(results *r, mhe_outbox *outbox, names *labels, mhe
     return status;
 }
 
-static mhe_status open_markers(results *r, mhe_outbox *outbox, const mhi_recording *recording,
+static mhe_status open_markers(results *r, mhe_outbox *outbox, const mhe_recording_info *recording,
                                names *labels, mhe_error *err) {
     static const char *const axes[] = {"_x", "_y", "_z"};
     const mhe_estimator_info *f = &r->info;
@@ -110,13 +110,13 @@ static mhe_status open_markers(results *r, mhe_outbox *outbox, const mhi_recordi
         add_names(labels, "", &f->marker_names[i / 3], 1, axes[i % 3]);
     }
     mhe_status status = mhe_sink_trc(outbox, "markers.trc", f->marker_names, f->n_markers,
-                                     recording->rate / f->ratio, recording->unit,
-                                     recording->unit_name, &r->markers.sinks[0], err);
+                                     recording->rate / f->ratio, recording->marker_unit,
+                                     recording->marker_unit_name, &r->markers.sinks[0], err);
     r->markers.n_sinks = status == MHE_OK;
     return status == MHE_OK ? open_others(r, outbox, "markers", labels, &r->markers, err) : status;
 }
 
-static mhe_status open_all(results *r, mhe_outbox *outbox, const mhi_recording *recording,
+static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_info *recording,
                            const char **room, mhe_error *err) {
     static const char *quality[] = {"status",   "iterations", "kkt_residual",
                                     "solve_ms", "marker_rms", "emg_rms"};
@@ -156,18 +156,9 @@ static mhe_status open_all(results *r, mhe_outbox *outbox, const mhi_recording *
                             : status;
 }
 
-static int32_t is_among(const mhe_text_list *list, const char *name) {
-    for (int32_t i = 0; i < list->n; i++) {
-        if (strcmp(list->values[i], name) == 0) {
-            return 1;
-        }
-    }
-    return 0;
-}
-
 mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
-                        const mhi_recording *recording, const mhe_text_list *formats,
-                        results **result, mhe_error *err) {
+                        const mhe_recording_info *recording, const char *formats, results **result,
+                        mhe_error *err) {
     *result = NULL;
     mhi_arena arena = {0};
     const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers + 6;
@@ -175,7 +166,7 @@ mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
     const char **room = MHI_TAKE(&arena, const char *, widest);
     if (r != NULL) {
         r->info = *info;
-        r->csv = is_among(formats, "csv");
+        r->csv = strstr(formats, "csv") != NULL;
         r->row = MHI_TAKE(&arena, double, widest);
         r->arena = arena;
     }
@@ -183,8 +174,9 @@ mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
         mhi_arena_free(&arena);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    mhe_status status =
-        is_among(formats, "mat") ? matlab_open(outbox, "results.mat", &r->matlab, err) : MHE_OK;
+    mhe_status status = strstr(formats, "mat") != NULL
+                            ? matlab_open(outbox, "results.mat", &r->matlab, err)
+                            : MHE_OK;
     if (status == MHE_OK) {
         status = open_all(r, outbox, recording, room, err);
     }

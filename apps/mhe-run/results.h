@@ -3,10 +3,8 @@
 #ifndef RESULTS_H
 #define RESULTS_H
 
-#include "estimator/recording.h"
 #include <mhe/outbox.h>
-
-#include <mhe/estimator.h>
+#include <mhe/recording.h>
 
 typedef struct results results;
 
@@ -15,12 +13,12 @@ extern const char *const results_names[];
 extern const int32_t results_n_names;
 
 /* Opens estimates, forces, torques, marker_residuals, emg and quality (.sto), markers.trc and
- * motion.sto in the outbox; with "csv" among the formats the same as .csv, with "mat" in
+ * motion.sto in the outbox; with "csv" in `formats` ("[csv, mat]") the same as .csv, with "mat" in
  * results.mat. Markers there are in m.
  */
 mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
-                        const mhi_recording *recording, const mhe_text_list *formats,
-                        results **result, mhe_error *err);
+                        const mhe_recording_info *recording, const char *formats, results **result,
+                        mhe_error *err);
 /* `distance` [n_markers] m of measured and estimated markers, `emg` [n_muscles] that was tracked.
  */
 mhe_status results_write(results *result, const mhe_estimate *estimate, const double *distance,

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "summary.h"
 
+#include "base/pi.h"
+#include "base/text.h"
 #include "measure.h"
-#include "plugin/loader.h"
 
 #include <cJSON.h>
 #include <math.h>
-#include <mhe/version.h>
+#include <mhe/library.h>
 #include <string.h>
 
 /* Of the sorted solve times, ms. */
@@ -19,8 +20,8 @@ static void add_number(cJSON *object, const char *key, double value) {
     cJSON_AddNumberToObject(object, key, value);
 }
 
-static void add_rmse(cJSON *root, const mhi_rmse *rmse) {
-    const double degrees = 180 / acos(-1);
+static void add_rmse(cJSON *root, const mhe_rmse *rmse) {
+    const double degrees = MHI_DEGREES;
     cJSON *o = cJSON_AddObjectToObject(root, "rmse");
     add_number(o, "q_deg", degrees * rmse->q);
     add_number(o, "qdot_rad_s", rmse->qdot);
@@ -51,14 +52,14 @@ static double latency(const summary *s, double fraction) {
 /* Where raw EMG was processed: what that takes. The latency is that from the electrode to the
  * estimate: filters, window, and the way from the newest frame to the estimate. */
 static void add_emg(cJSON *root, const summary *s) {
-    const mhi_emg_report *emg = &s->emg;
+    const mhe_recording_info *emg = &s->recording;
     cJSON *o = cJSON_AddObjectToObject(root, "emg");
-    add_number(o, "channels", emg->n_channels);
-    add_number(o, "rate_hz", emg->rate);
-    add_number(o, "offset_ms", 1e3 * emg->offset);
-    add_number(o, "filter_delay_ms", 1e3 * emg->filter_delay);
-    add_number(o, "lag_ms", 1e3 * emg->lag);
-    const double before = 1e3 * (s->info.delay + emg->filter_delay);
+    add_number(o, "channels", emg->emg_channels);
+    add_number(o, "rate_hz", emg->emg_rate);
+    add_number(o, "offset_ms", 1e3 * emg->emg_offset);
+    add_number(o, "filter_delay_ms", 1e3 * emg->emg_filter_delay);
+    add_number(o, "lag_ms", 1e3 * emg->emg_lag);
+    const double before = 1e3 * (s->info.delay + emg->emg_filter_delay);
     cJSON *latencies = cJSON_AddObjectToObject(o, "latency_ms");
     add_number(latencies, "p50", before + latency(s, 0.5));
     add_number(latencies, "p99", before + latency(s, 0.99));
@@ -84,47 +85,41 @@ static void add_realtime(cJSON *root, const summary *s) {
     add_spread(o, "jitter_ms", l->jitter, l->n_jitter);
 }
 
-static void add_plugin(cJSON *object, const mhe_plugin *plugin) {
-    const char *file = NULL;
-    if (plugin != NULL && cJSON_GetObjectItemCaseSensitive(object, plugin->id) == NULL &&
-        mhi_plugin_library(plugin, &file, NULL) == MHE_OK) {
-        cJSON_AddStringToObject(object, plugin->id, file);
-    }
-}
-
 /* Whose code made the results. */
-static void add_plugins(cJSON *root, const mhi_run *run) {
+static void add_plugins(cJSON *root, const mhe_config *config) {
     cJSON *o = cJSON_AddObjectToObject(root, "plugins");
-    add_plugin(o, run->model.plugin);
-    add_plugin(o, run->muscle.plugin);
-    add_plugin(o, run->integrator.plugin);
-    add_plugin(o, run->solver.plugin);
-    for (int32_t i = 0; i < run->n_costs; i++) {
-        add_plugin(o, run->costs[i].plugin);
+    const char *id = NULL, *file = NULL;
+    for (int32_t i = 0; mhe_config_plugin(config, i, &id, &file); i++) {
+        cJSON_AddStringToObject(o, id, file);
     }
 }
 
 static const char *weight_name(int32_t weight) {
-    return weight == MHI_FINDING_NOTE       ? "note"
-           : weight == MHI_FINDING_DOUBTFUL ? "doubtful"
+    return weight == MHE_FINDING_NOTE       ? "note"
+           : weight == MHE_FINDING_DOUBTFUL ? "doubtful"
                                             : "not usable";
+}
+
+static const char *usable(int32_t weight) {
+    return weight == MHE_FINDING_NOTE ? "yes" : weight == MHE_FINDING_DOUBTFUL ? "doubtful" : "no";
 }
 
 static void add_verdict(cJSON *root, const summary *s) {
     cJSON *verdict = cJSON_AddObjectToObject(root, "verdict");
-    cJSON_AddStringToObject(verdict, "usable", mhi_usable(mhi_findings_weight(s->findings)));
+    cJSON_AddStringToObject(verdict, "usable", usable(s->weight));
     cJSON *list = cJSON_AddArrayToObject(verdict, "findings");
-    for (int32_t i = 0; i < s->findings->n; i++) {
-        const mhi_finding *f = &s->findings->all[i];
+    mhe_finding f = {.size = sizeof f};
+    for (int32_t i = 0; mhe_findings_at(s->findings, i, &f, NULL) == MHE_OK; i++) {
         cJSON *one = cJSON_CreateObject();
-        cJSON_AddStringToObject(one, "weight", weight_name(f->weight));
-        cJSON_AddStringToObject(one, "what", f->text);
-        cJSON_AddStringToObject(one, "remedy", mhi_finding_remedy(f));
+        cJSON_AddStringToObject(one, "weight", weight_name(f.weight));
+        cJSON_AddStringToObject(one, "what", f.text);
+        cJSON_AddStringToObject(one, "remedy", f.remedy);
         cJSON_AddItemToArray(list, one);
     }
     cJSON *dropped = cJSON_AddArrayToObject(root, "dropped");
-    for (int32_t i = 0; i < s->model->n_unsupported; i++) {
-        cJSON_AddItemToArray(dropped, cJSON_CreateString(s->model->unsupported[i]));
+    const char *what = NULL;
+    for (int32_t i = 0; (what = mhe_config_dropped(s->config, i)) != NULL; i++) {
+        cJSON_AddItemToArray(dropped, cJSON_CreateString(what));
     }
 }
 
@@ -151,8 +146,9 @@ static void add_channels(cJSON *root, const summary *s) {
         double squares = 0, present = 0, left_out = 0;
         for (int32_t pass = 0; pass < 2; pass++) {
             for (int32_t i = 0; i < n; i++) {
-                const mhi_channel_tally t = kind == 0 ? mhi_diagnosis_marker(s->diagnosis, i)
-                                                      : mhi_diagnosis_muscle(s->diagnosis, i);
+                mhe_tracking t = {.size = sizeof t};
+                (void)(kind == 0 ? mhe_findings_marker : mhe_findings_muscle)(s->findings, i, &t,
+                                                                              NULL);
                 if (pass == 0) {
                     squares += t.present > 0 ? t.present * t.rms * t.rms : 0;
                     present += t.present;
@@ -172,16 +168,16 @@ static void add_channels(cJSON *root, const summary *s) {
     }
 }
 
-mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error *err) {
+mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *err) {
     tally_sort(&s->tally);
     cJSON *root = cJSON_CreateObject();
-    cJSON_AddStringToObject(root, "version", MHE_VERSION);
-    cJSON_AddStringToObject(root, "config", run->path);
+    cJSON_AddStringToObject(root, "version", mhe_version());
+    cJSON_AddStringToObject(root, "config", path);
     cJSON *model = cJSON_AddObjectToObject(root, "model");
     add_number(model, "nq", s->info.n_q);
     add_number(model, "nmuscles", s->info.n_muscles);
     add_number(model, "nmarkers", s->info.n_markers);
-    add_plugins(root, run);
+    add_plugins(root, s->config);
     cJSON_AddStringToObject(root, "formulation",
                             s->info.formulation == 0 ? "excitation" : "activation");
     add_number(root, "n_window", s->info.window);
@@ -201,7 +197,7 @@ mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error
     if (s->live != NULL) {
         add_realtime(root, s);
     }
-    if (s->emg.n_channels > 0) {
+    if (s->recording.emg_channels > 0) {
         add_emg(root, s);
     }
     if (s->has_rmse) {
@@ -220,29 +216,31 @@ mhe_status summary_json(summary *s, const mhi_run *run, mhi_text *out, mhe_error
 }
 
 void summary_verdict(const summary *s, mhi_text *out) {
-    const int32_t weight = mhi_findings_weight(s->findings);
-    mhi_text_add(out, "usable: %s\n", mhi_usable(weight));
-    for (int32_t level = MHI_FINDING_USELESS; level >= MHI_FINDING_NOTE; level--) {
-        for (int32_t i = 0; i < s->findings->n; i++) {
-            const mhi_finding *f = &s->findings->all[i];
-            if (f->weight == level) {
-                mhi_text_add(out, "  %s: %s\n", weight_name(level), f->text);
-                if (*mhi_finding_remedy(f) != '\0') {
-                    mhi_text_add(out, "    try: %s\n", mhi_finding_remedy(f));
+    mhe_finding f = {.size = sizeof f};
+    mhi_text_add(out, "usable: %s\n", usable(s->weight));
+    for (int32_t level = MHE_FINDING_USELESS; level >= MHE_FINDING_NOTE; level--) {
+        for (int32_t i = 0; mhe_findings_at(s->findings, i, &f, NULL) == MHE_OK; i++) {
+            if (f.weight == level) {
+                mhi_text_add(out, "  %s: %s\n", weight_name(level), f.text);
+                if (*f.remedy != '\0') {
+                    mhi_text_add(out, "    try: %s\n", f.remedy);
                 }
             }
         }
     }
-    if (s->model->n_unsupported > 0) {
+    int32_t n = 0;
+    while (mhe_config_dropped(s->config, n) != NULL) {
+        n++;
+    }
+    if (n > 0) {
         mhi_text_add(out, "left out of the model: %d element%s (summary.json: dropped), first %s\n",
-                     s->model->n_unsupported, s->model->n_unsupported == 1 ? "" : "s",
-                     s->model->unsupported[0]);
+                     n, n == 1 ? "" : "s", mhe_config_dropped(s->config, 0));
     }
 }
 
 void summary_lines(const summary *s, mhi_text *out) {
-    if (s->emg.n_channels > 0) {
-        mhi_text_add(out, "%s\n", s->alignment);
+    if (s->recording.emg_channels > 0) {
+        mhi_text_add(out, "%s\n", s->recording.alignment);
     }
     mhi_text_add(out, "%d frames, %d solves, %.2f %% converged\n", s->n_pushed, s->tally.n_solves,
                  s->tally.n_solves == 0 ? 0.0 : 100.0 * s->tally.n_converged / s->tally.n_solves);
@@ -251,14 +249,14 @@ void summary_lines(const summary *s, mhi_text *out) {
                      1e3 / tally_mean_ms(&s->tally), percentile(s, 0.5), percentile(s, 0.99),
                      percentile(s, 1));
     }
-    if (s->emg.n_channels > 0 && s->tally.n_solves > 0) {
-        const double before = 1e3 * (s->info.delay + s->emg.filter_delay);
+    if (s->recording.emg_channels > 0 && s->tally.n_solves > 0) {
+        const double before = 1e3 * (s->info.delay + s->recording.emg_filter_delay);
         mhi_text_add(
             out,
             "from electrode to estimate: filters %.3g ms, window %.3g ms, then %.2f ms median, "
             "%.2f ms p99; together %.4g ms (p99)\n",
-            1e3 * s->emg.filter_delay, 1e3 * s->info.delay, latency(s, 0.5), latency(s, 0.99),
-            before + latency(s, 0.99));
+            1e3 * s->recording.emg_filter_delay, 1e3 * s->info.delay, latency(s, 0.5),
+            latency(s, 0.99), before + latency(s, 0.99));
     }
     if (s->live != NULL) {
         live_lines(s->live, s->tally.n_solves / s->elapsed, out);
@@ -266,7 +264,7 @@ void summary_lines(const summary *s, mhi_text *out) {
     const struct {
         const char *what, *unit;
         double value;
-    } errors[] = {{"joint angles", "deg", 180 / acos(-1) * s->rmse.q},
+    } errors[] = {{"joint angles", "deg", MHI_DEGREES * s->rmse.q},
                   {"muscle forces", "N", s->rmse.force},
                   {"markers", "mm", 1e3 * s->rmse.marker}};
     const char *lead = "error against the reference (RMSE): ";

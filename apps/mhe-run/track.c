@@ -1,9 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "track.h"
 
-#include "believe/believe.h"
-#include "believe/diagnosis.h"
-#include "estimator/create.h"
 #include "interrupt.h"
 #include "picture.h"
 #include "progress.h"
@@ -17,40 +14,57 @@
 typedef struct tracking {
     const track_setup *setup;
     mhe_estimator *estimator;
-    mhi_recording *recording;
-    mhi_errors *errors;
-    mhi_diagnosis *diagnosis;
+    mhe_recording *recording;
+    mhe_findings *findings;
     mhe_outbox *outbox;
     results *results;
     summary summary;
     live live;
 } tracking;
 
+/* A key that every configuration has, as a number; 0 where it is none. */
+static double number(const tracking *t, const char *key) {
+    double value = 0;
+    (void)mhe_config_get_real(t->setup->config, key, &value, NULL);
+    return value;
+}
+
 /* What live use expects where the config leaves it open. */
 static mhe_status open_live(tracking *t, mhe_error *err) {
-    const mhi_run *run = t->setup->run;
-    const double between = run->horizon.ratio / t->recording->rate;
-    t->live.deadline = run->realtime.deadline_ms > 0 ? 1e-3 * run->realtime.deadline_ms : between;
-    mhi_estimator_set_deadline(t->estimator, t->live.deadline);
-    if (strcmp(run->output.node_name, "auto") == 0) {
-        mhi_estimator_set_node(t->estimator, run->horizon.window);
+    const mhe_estimator_info *info = &t->summary.info;
+    const double deadline = 1e-3 * number(t, "realtime.deadline_ms");
+    t->live.deadline = deadline > 0 ? deadline : info->ratio / t->summary.recording.rate;
+    char *node = NULL;
+    mhe_status status = mhe_estimator_set_deadline(t->estimator, t->live.deadline, err);
+    if (status == MHE_OK) {
+        status = mhe_config_get(t->setup->config, "output.node", &node, err);
     }
+    if (status == MHE_OK && strcmp(node, "auto") == 0) {
+        status = mhe_estimator_set_node(t->estimator, info->window, err);
+    }
+    mhe_free(node);
     t->summary.live = &t->live;
-    return live_open(&t->live, t->recording->n_frames, err);
+    return status == MHE_OK ? live_open(&t->live, t->summary.recording.n_frames, err) : status;
 }
 
 /* Before anything else: a folder that cannot be written to is told at once, not after the run. */
 static mhe_status claim_folder(tracking *t, mhe_error *err) {
-    const mhi_run *run = t->setup->run;
-    const mhi_data_section *d = &run->data;
-    const char *const inputs[] = {run->path, run->model_file.file, d->markers,       d->emg,
-                                  d->angles, d->reference,         run->emg.mvc_file};
+    static const char *const inputs[] = {"model.file",  "data.markers",   "data.emg",
+                                         "data.angles", "data.reference", "emg.mvc_file"};
     mhe_status status = mhe_outbox_open(t->setup->out, &t->outbox, err);
     if (status == MHE_OK) {
         status = mhe_outbox_claim(t->outbox, results_names, results_n_names, err);
     }
+    if (status == MHE_OK) {
+        status = mhe_outbox_spare(t->outbox, t->setup->path, err);
+    }
     for (size_t i = 0; i < sizeof inputs / sizeof inputs[0] && status == MHE_OK; i++) {
-        status = mhe_outbox_spare(t->outbox, inputs[i], err);
+        char *path = NULL;
+        status = mhe_config_get(t->setup->config, inputs[i], &path, err);
+        if (status == MHE_OK && path[0] != '\0') {
+            status = mhe_outbox_spare(t->outbox, path, err);
+        }
+        mhe_free(path);
     }
     return status;
 }
@@ -70,16 +84,25 @@ static void tell_stale(const tracking *t) {
     mhe_free(names);
 }
 
-/* What the recording and the model say of each other; warnings of it, too. */
-static mhe_status believe(tracking *t, const mhi_system *system, mhe_error *err) {
-    const track_setup *s = t->setup;
-    mhi_findings *findings = &t->recording->findings;
-    const int32_t told = findings->n;
-    mhe_status status = mhi_believe_model(s->run, system, t->recording, findings, err);
-    if (status == MHE_OK) {
-        status = mhi_believe_fit(s->run, system, t->recording, findings, err);
+/* The reference knows how the run begins. */
+static mhe_status start_as_known(tracking *t, mhe_error *err) {
+    mhe_truth truth = {.size = sizeof truth};
+    if (!t->summary.recording.has_reference) {
+        return MHE_OK;
     }
-    mhi_findings_tell(findings, told, s->host);
+    mhe_status status = mhe_recording_truth(t->recording, 0, &truth, err);
+    return status == MHE_OK ? mhe_estimator_set_start(t->estimator, truth.q, truth.qdot, err)
+                            : status;
+}
+
+static mhe_status open_results(tracking *t, mhe_error *err) {
+    char *formats = NULL;
+    mhe_status status = mhe_config_get(t->setup->config, "output.formats", &formats, err);
+    if (status == MHE_OK) {
+        status = results_open(t->outbox, &t->summary.info, &t->summary.recording, formats,
+                              &t->results, err);
+    }
+    mhe_free(formats);
     return status;
 }
 
@@ -90,61 +113,47 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
     }
     mhe_status status = s->check_only ? MHE_OK : claim_folder(t, err);
     if (status == MHE_OK) {
-        status = mhi_estimator_create(s->run, s->host, &t->estimator, err);
+        status = mhe_estimator_create(s->config, &t->estimator, err);
     }
     if (status != MHE_OK) {
         return status;
     }
-    const mhi_system *system = mhi_estimator_system(t->estimator);
     t->summary.info.size = sizeof t->summary.info;
+    t->summary.recording.size = sizeof t->summary.recording;
     mhe_estimator_describe(t->estimator, &t->summary.info);
-    status =
-        mhi_recording_read(s->run, mhi_system_description(system), s->host, &t->recording, err);
+    status = mhe_recording_open(s->config, &t->recording, err);
     if (status == MHE_OK) {
-        status = believe(t, system, err);
+        status = mhe_recording_describe(t->recording, &t->summary.recording, err);
     }
-    if (status == MHE_OK && t->recording->reference.present) {
-        mhi_estimator_set_start(t->estimator, t->recording->reference.q,
-                                t->recording->reference.qdot);
-        status = mhi_errors_create(system, t->recording, &t->errors, err);
+    if (status == MHE_OK) {
+        status = start_as_known(t, err);
+    }
+    if (status == MHE_OK) {
+        status = mhe_findings_open(s->config, t->estimator, t->recording, &t->findings, err);
     }
     if (status == MHE_OK && s->realtime) {
         status = open_live(t, err);
     }
-    if (status == MHE_OK && !s->check_only) {
-        t->summary.n_frames = t->recording->n_frames;
-        t->summary.emg = t->recording->emg_report;
-        t->summary.alignment = t->recording->alignment;
-        status = mhi_diagnosis_create(&t->summary.info, s->run, t->recording, system, &t->diagnosis,
-                                      err);
-    }
-    if (status == MHE_OK && !s->check_only) {
-        status = results_open(t->outbox, &t->summary.info, t->recording, &s->run->output.formats,
-                              &t->results, err);
-    }
-    return status;
+    return status == MHE_OK && !s->check_only ? open_results(t, err) : status;
 }
 
 static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_error *err) {
-    mhi_diagnosis_add(t->diagnosis, estimate);
-    mhe_status status = results_write(t->results, estimate, mhi_diagnosis_distances(t->diagnosis),
-                                      mhi_diagnosis_emg(t->diagnosis), err);
+    mhe_status status = mhe_findings_add(t->findings, estimate, err);
     if (status == MHE_OK) {
-        status = tally_add(&t->summary.tally, estimate, err);
+        status = results_write(t->results, estimate, mhe_findings_distances(t->findings),
+                               mhe_findings_emg(t->findings), err);
     }
-    if (status == MHE_OK && t->errors != NULL) {
-        status = mhi_errors_add(t->errors, estimate, err);
-    }
-    return status;
+    return status == MHE_OK ? tally_add(&t->summary.tally, estimate, err) : status;
 }
 
 static mhe_status estimate_frame(tracking *t, int32_t k, mhe_error *err) {
-    const mhi_recording *r = t->recording;
-    const mhe_estimator_info *info = &t->summary.info;
-    const mhe_frame frame = mhi_recording_frame(r, info->n_markers, info->n_muscles, k);
+    mhe_frame frame = {.size = sizeof frame};
     mhe_estimate estimate = {.size = sizeof estimate};
     int32_t ready = 0;
-    mhe_status status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
+    mhe_status status = mhe_recording_frame(t->recording, k, &frame, err);
+    if (status == MHE_OK) {
+        status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
+    }
     if (status == MHE_OK && ready) {
         if (t->setup->realtime) {
             live_estimated(&t->live);
@@ -163,17 +172,15 @@ static void show(progress *bar, int32_t done, const tally *t) {
 }
 
 static mhe_status estimate_all(tracking *t, mhe_error *err) {
-    const int32_t n = t->recording->n_frames;
-    const atomic_int *stop = interrupt_asked();
+    const int32_t n = t->summary.recording.n_frames;
     progress bar;
     progress_start(&bar, n, 0, t->setup->quiet);
-    mhi_estimator_set_stop(t->estimator, stop);
     mhe_status status = MHE_OK;
-    for (int32_t k = 0; k < n && status == MHE_OK && !*stop; k++) {
+    for (int32_t k = 0; k < n && status == MHE_OK && !interrupt_asked(); k++) {
         if (t->setup->realtime) {
-            k = live_wait(&t->live, t->estimator, t->recording->time, n);
+            k = live_wait(&t->live, t->estimator, t->summary.recording.time, n);
         }
-        status = *stop ? MHE_OK : estimate_frame(t, k, err);
+        status = interrupt_asked() ? MHE_OK : estimate_frame(t, k, err);
         show(&bar, k + 1, &t->summary.tally);
     }
     status = status == MHE_E_INTERRUPTED ? MHE_OK : status; /* finish() tells */
@@ -185,54 +192,72 @@ static mhe_status estimate_all(tracking *t, mhe_error *err) {
 }
 
 static mhe_status write_texts(tracking *t, mhe_error *err) {
-    const mhi_run *run = t->setup->run;
-    mhi_text text = {0};
-    if (t->errors != NULL) {
-        t->summary.has_rmse = 1;
-        mhi_errors_rmse(t->errors, run->output.skip_first, run->output.skip_last, &t->summary.rmse);
+    mhe_config *config = t->setup->config;
+    mhi_text json = {0};
+    char *resolved = NULL;
+    mhe_status status = MHE_OK;
+    t->summary.has_rmse = t->summary.recording.has_reference;
+    t->summary.rmse.size = sizeof t->summary.rmse;
+    if (t->summary.has_rmse) {
+        status = mhe_findings_rmse(t->findings, (int32_t)number(t, "output.skip_first"),
+                                   (int32_t)number(t, "output.skip_last"), &t->summary.rmse, err);
     }
     mhe_estimator_describe(t->estimator, &t->summary.info); /* the interval is known now */
-    mhi_diagnosis_judge(t->diagnosis, &t->recording->findings);
-    t->summary.findings = &t->recording->findings;
-    t->summary.diagnosis = t->diagnosis;
-    t->summary.model = mhi_system_description(mhi_estimator_system(t->estimator));
-    mhi_run_write(run, &text);
-    mhe_status status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                    : mhe_outbox_text(t->outbox, "config.yaml", text.data, err);
-    mhi_text_free(&text);
+    t->summary.findings = t->findings;
+    t->summary.config = config;
     if (status == MHE_OK) {
-        status = summary_json(&t->summary, run, &text, err);
+        status = mhe_findings_judge(t->findings, &t->summary.weight, err);
     }
     if (status == MHE_OK) {
-        status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                             : mhe_outbox_text(t->outbox, "summary.json", text.data, err);
+        status = mhe_config_write(config, &resolved, err);
     }
-    mhi_text_free(&text);
+    if (status == MHE_OK) {
+        status = mhe_outbox_text(t->outbox, "config.yaml", resolved, err);
+    }
+    mhe_free(resolved);
+    if (status == MHE_OK) {
+        status = summary_json(&t->summary, t->setup->path, &json, err);
+    }
+    if (status == MHE_OK) {
+        status = json.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                             : mhe_outbox_text(t->outbox, "summary.json", json.data, err);
+    }
+    mhi_text_free(&json);
     return status;
 }
 
 static void draw(tracking *t) {
-    const mhi_run *run = t->setup->run;
+    char *reference = NULL;
     mhe_error why = {0};
-    if (!run->output.picture || t->summary.info.n_muscles == 0) { /* no forces to show */
+    if (number(t, "output.picture") == 0 ||
+        t->summary.info.n_muscles == 0) { /* no forces to show */
         return;
     }
-    mhe_status status = picture_estimates(t->setup->out, run->data.reference, &why);
+    mhe_status status = mhe_config_get(t->setup->config, "data.reference", &reference, &why);
+    if (status == MHE_OK) {
+        status = picture_estimates(t->setup->out, reference[0] != '\0' ? reference : NULL, &why);
+    }
     if (status != MHE_OK) {
         t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
     }
+    mhe_free(reference);
 }
 
 static void tell(const tracking *t) {
     mhi_text text = {0};
     mhe_error why = {0};
+    char *findings = NULL;
     summary_verdict(&t->summary, &text);
     summary_lines(&t->summary, &text);
-    mhi_diagnosis_lines(t->diagnosis, &text);
+    if (mhe_findings_write(t->findings, &findings, &why) == MHE_OK) {
+        mhi_text_add(&text, "%s", findings);
+    }
+    mhe_free(findings);
     if (!text.failed) {
         (void)fputs(text.data, stdout);
         (void)printf("results in %s\n", t->setup->out);
-        if (report_write(t->setup->out, t->setup->run->name, text.data, &why) != MHE_OK) {
+        if (report_write(t->setup->out, mhe_config_name(t->setup->config), text.data, &why) !=
+            MHE_OK) {
             t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
         }
     }
@@ -240,7 +265,7 @@ static void tell(const tracking *t) {
 }
 
 static mhe_status finish(tracking *t, mhe_error *err) {
-    if (t->summary.tally.n_solves == 0 && !*interrupt_asked()) {
+    if (t->summary.tally.n_solves == 0 && !interrupt_asked()) {
         return mhe_fail(err, MHE_E_INPUT,
                         "no frame has a marker or an angle to begin from; nothing is written");
     }
@@ -263,11 +288,11 @@ static mhe_status finish(tracking *t, mhe_error *err) {
                             "no solve converged; quality.sto says how each ended");
     }
     tell(t);
-    if (*interrupt_asked()) {
+    if (interrupt_asked()) {
         return mhe_fail(
             err, MHE_E_INTERRUPTED,
             "interrupted after %d of %d frames; the files hold what was estimated until then",
-            t->summary.n_pushed, t->summary.n_frames);
+            t->summary.n_pushed, t->summary.recording.n_frames);
     }
     if (t->summary.tally.n_predicted == t->summary.tally.n_solves) {
         return mhe_fail(err, MHE_E_NUMERIC,
@@ -281,7 +306,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     tracking t = {.setup = setup};
     mhe_status status = open_all(&t, err);
     if (status == MHE_OK && !setup->check_only) {
-        interrupt_begin(t.outbox);
+        interrupt_begin(t.outbox, t.estimator);
         status = estimate_all(&t, err);
         interrupt_settle();
         if (status == MHE_OK) {
@@ -294,9 +319,8 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     }
     results_close(t.results);
     mhe_outbox_close(t.outbox);
-    mhi_errors_free(t.errors);
-    mhi_diagnosis_free(t.diagnosis);
-    mhi_recording_free(t.recording);
+    mhe_findings_close(t.findings);
+    mhe_recording_close(t.recording);
     mhe_estimator_close(t.estimator);
     tally_free(&t.summary.tally);
     live_close(&t.live);

@@ -3,10 +3,11 @@
 #ifndef TRACK_H
 #define TRACK_H
 
-#include "config/run.h"
+#include <mhe/config.h>
 
 typedef struct track_setup {
-    const mhi_run *run;
+    const char *path; /* of the config */
+    mhe_config *config;
     const mhe_host *host;
     const char *out; /* folder */
     int quiet;

@@ -26,7 +26,8 @@ static inline void expect_done(mhe_status status, const mhe_error *err) {
 static inline mhe_config *read_demo(const char *set) {
     mhe_config *config = NULL;
     mhe_error err = {0};
-    expect_done(mhe_config_read(ARM19 "/demo.yaml", &set, set != NULL, NULL, &config, &err), &err);
+    expect_done(mhe_config_read(ARM19 "/demo.yaml", &set, set != NULL, 0, NULL, &config, &err),
+                &err);
     return config;
 }
 

@@ -12,8 +12,8 @@ static const char yaml[] = "model: {file: arm19.osim}\n"
 static mhe_config *parse(const char *text, uint64_t length, const char *set, mhe_status expected,
                          mhe_error *err) {
     mhe_config *config = NULL;
-    assert_int_equal(mhe_config_parse("made/run.yaml", text, length, ARM19, &set, set != NULL, NULL,
-                                      &config, err),
+    assert_int_equal(mhe_config_parse("made/run.yaml", text, length, ARM19, &set, set != NULL, 0,
+                                      NULL, &config, err),
                      expected);
     return config;
 }
@@ -90,13 +90,13 @@ static void null_is_an_argument_error(void **state) {
     char *text = NULL;
     double number = 0;
     const char *hole = NULL;
-    assert_int_equal(mhe_config_read(NULL, NULL, 0, NULL, &none, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_config_read(NULL, NULL, 0, 0, NULL, &none, &err), MHE_E_ARGUMENT);
     assert_string_equal(err.text, "mhe_config_read: 'path' is NULL");
-    assert_int_equal(mhe_config_read("x", NULL, 0, NULL, NULL, NULL), MHE_E_ARGUMENT);
-    assert_int_equal(mhe_config_read("x", NULL, 1, NULL, &none, &err), MHE_E_ARGUMENT);
-    assert_int_equal(mhe_config_read("x", &hole, 1, NULL, &none, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_config_read("x", NULL, 0, 0, NULL, NULL, NULL), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_config_read("x", NULL, 1, 0, NULL, &none, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_config_read("x", &hole, 1, 0, NULL, &none, &err), MHE_E_ARGUMENT);
     assert_string_equal(err.text, "mhe_config_read: assignment 0 of 'set' is NULL");
-    assert_int_equal(mhe_config_parse("x", NULL, 0, NULL, NULL, 0, NULL, &none, &err),
+    assert_int_equal(mhe_config_parse("x", NULL, 0, NULL, NULL, 0, 0, NULL, &none, &err),
                      MHE_E_ARGUMENT);
     assert_int_equal(mhe_config_write(NULL, &text, &err), MHE_E_ARGUMENT);
     assert_int_equal(mhe_config_write(config, NULL, &err), MHE_E_ARGUMENT);

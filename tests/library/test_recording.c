@@ -3,8 +3,7 @@
 #include "outside.h"
 
 #include <math.h>
-#include <mhe/estimator.h>
-#include <mhe/recording.h>
+#include <mhe/findings.h>
 
 static mhe_recording *open_recording(mhe_config *config, mhe_recording_info *info) {
     mhe_recording *recording = NULL;
@@ -121,8 +120,86 @@ static void an_estimator_takes_the_frames(void **state) {
     mhe_config_close(config);
 }
 
+/* Frames 0 .. 59 into an estimator, estimates into findings; the status of the last push. */
+static mhe_status push_all(mhe_recording *recording, mhe_estimator *estimator,
+                           mhe_findings *findings, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t k = 0; k < 60 && status == MHE_OK; k++) {
+        mhe_frame frame = {.size = sizeof frame};
+        mhe_estimate estimate = {.size = sizeof estimate};
+        int32_t ready = 0;
+        expect_done(mhe_recording_frame(recording, k, &frame, err), err);
+        status = mhe_estimator_push(estimator, &frame, &estimate, &ready, err);
+        if (status == MHE_OK && ready) {
+            expect_done(mhe_findings_add(findings, &estimate, err), err);
+        }
+    }
+    return status;
+}
+
+static void findings_tell_errors_and_lines(void **state) {
+    (void)state;
+    mhe_config *config = read_demo("horizon.window=3");
+    mhe_recording_info info;
+    mhe_error err = {0};
+    mhe_recording *recording = open_recording(config, &info);
+    mhe_estimator *estimator = NULL;
+    mhe_findings *findings = NULL;
+    mhe_rmse rmse = {.size = sizeof rmse};
+    char *text = NULL;
+    expect_done(mhe_estimator_create(config, &estimator, &err), &err);
+    expect_done(mhe_findings_open(config, estimator, recording, &findings, &err), &err);
+    expect_done(push_all(recording, estimator, findings, &err), &err);
+    expect_done(mhe_findings_rmse(findings, 5, 0, &rmse, &err), &err);
+    assert_true(rmse.q > 0 && rmse.q < 1e-3 && rmse.force > 0 && rmse.force < 20);
+    assert_true(mhe_findings_distances(findings)[0] < 0.005); /* m */
+    expect_done(mhe_findings_write(findings, &text, &err), &err);
+    assert_non_null(strstr(text, "markers: 0.0 % of the samples missing"));
+    mhe_free(text);
+    mhe_estimate empty = {.size = sizeof empty};
+    assert_int_equal(mhe_findings_add(findings, &empty, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_findings_add(findings, NULL, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_findings_open(config, NULL, recording, &findings, &err), MHE_E_ARGUMENT);
+    mhe_findings_close(findings);
+    mhe_estimator_close(estimator);
+    mhe_recording_close(recording);
+    mhe_config_close(config);
+}
+
+static void an_estimator_is_steered_from_outside(void **state) {
+    (void)state;
+    mhe_config *config = read_demo("horizon.window=3");
+    mhe_recording_info info;
+    mhe_error err = {0};
+    mhe_recording *recording = open_recording(config, &info);
+    mhe_estimator *estimator = NULL;
+    mhe_findings *findings = NULL;
+    mhe_estimator_info is = {.size = sizeof is};
+    expect_done(mhe_estimator_create(config, &estimator, &err), &err);
+    expect_done(mhe_findings_open(config, estimator, recording, &findings, &err), &err);
+    expect_done(mhe_estimator_set_node(estimator, 3, &err), &err);
+    mhe_estimator_describe(estimator, &is);
+    assert_int_equal(is.node, 3);
+    assert_int_equal(mhe_estimator_set_node(estimator, 4, &err), MHE_E_ARGUMENT);
+    assert_string_equal(err.text, "mhe_estimator_set_node: 4 is no node of the window, 0 .. 3");
+    assert_int_equal(mhe_estimator_set_node(estimator, -1, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_estimator_set_node(NULL, 0, &err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_estimator_set_deadline(estimator, NAN, &err), MHE_E_ARGUMENT);
+    expect_done(mhe_estimator_set_deadline(estimator, 0, &err), &err);
+    expect_done(mhe_estimator_set_start(estimator, NULL, NULL, &err), &err);
+    mhe_estimator_stop(NULL, 1);
+    mhe_estimator_stop(estimator, 1);
+    assert_int_equal(push_all(recording, estimator, findings, &err), MHE_E_INTERRUPTED);
+    mhe_findings_close(findings);
+    mhe_estimator_close(estimator);
+    mhe_recording_close(recording);
+    mhe_config_close(config);
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(frames_and_truth_are_there),
+    const struct CMUnitTest tests[] = {cmocka_unit_test(findings_tell_errors_and_lines),
+                                       cmocka_unit_test(an_estimator_is_steered_from_outside),
+                                       cmocka_unit_test(frames_and_truth_are_there),
                                        cmocka_unit_test(nothing_is_written_beyond_the_callers_size),
                                        cmocka_unit_test(what_is_not_there_is_refused),
                                        cmocka_unit_test(an_estimator_takes_the_frames)};

@@ -218,6 +218,21 @@ MHE_API mhe_status mhe_estimator_open(const char *config, const char *const *set
                                       mhe_error *err);
 MHE_API void mhe_estimator_close(mhe_estimator *estimator); /* NULL is fine. [cold] */
 
+/* Before the first push, instead of what the config leaves open: the first state q, qdot [n_q], rad
+ * (m) and per s; NaN, or NULL for all of them, where it is not known. [cold] */
+MHE_API mhe_status mhe_estimator_set_start(mhe_estimator *estimator, const double *q,
+                                           const double *qdot, mhe_error *err);
+/* Instead of what the config says: the node whose estimates are given, 0 .. window (output.node);
+ * the time from a frame to its estimate in s, 0: no limit (realtime.deadline_ms). MHE_E_ARGUMENT:
+ * no such node; negative or NaN. [cold] */
+MHE_API mhe_status mhe_estimator_set_node(mhe_estimator *estimator, int32_t node, mhe_error *err);
+MHE_API mhe_status mhe_estimator_set_deadline(mhe_estimator *estimator, double seconds,
+                                              mhe_error *err);
+/* While `stop` is not 0 every push that would solve ends at once without an estimate, and so does
+ * the one in work: MHE_E_INTERRUPTED. From any thread, and from a signal handler; NULL is fine.
+ * [any] */
+MHE_API void mhe_estimator_stop(mhe_estimator *estimator, int32_t stop);
+
 /* Fills `info` up to its size. [cold] */
 MHE_API mhe_status mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
 /* Row of the table with this name; -1: there is none. [any] */

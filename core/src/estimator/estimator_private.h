@@ -33,6 +33,7 @@ typedef struct mhi_pace {
 struct mhe_estimator {
     const mhe_host *host;
     mhe_config *config; /* its own; NULL where it was lent */
+    atomic_int stopped; /* mhe_estimator_stop */
     const mhi_run *run;
     mhe_description *owned_description; /* NULL where it was lent */
     const mhe_description *description;

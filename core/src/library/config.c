@@ -5,12 +5,13 @@
 #include "config/yaml_scalar.h"
 #include "estimator/create.h"
 #include "io/model_file.h"
+#include "plugin/loader.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 static mhe_status open_config(const mhi_run_text *text, const char *path, const char *const *set,
-                              int32_t n_set, const mhe_host *host, mhe_config **out,
+                              int32_t n_set, uint32_t flags, const mhe_host *host, mhe_config **out,
                               mhe_error *err) {
     mhe_config *c = calloc(1, sizeof *c);
     if (c == NULL) {
@@ -19,6 +20,7 @@ static mhe_status open_config(const mhi_run_text *text, const char *path, const 
     c->host = mhi_host_or_silent(host);
     mhe_status status = mhi_registry_create(c->host, &c->registry, err);
     if (status == MHE_OK) {
+        mhi_registry_trust_files(c->registry, (flags & MHE_CONFIG_TRUST) != 0);
         status = mhi_run_parse(text, path, set, n_set, c->registry, &c->run, err);
     }
     if (status != MHE_OK) {
@@ -40,26 +42,28 @@ static mhe_status check_set(const char *function, const char *const *set, int32_
     return MHE_OK;
 }
 
-mhe_status mhe_config_read(const char *path, const char *const *set, int32_t n_set,
+mhe_status mhe_config_read(const char *path, const char *const *set, int32_t n_set, uint32_t flags,
                            const mhe_host *host, mhe_config **config, mhe_error *err) {
     mhe_status status = MHI_NEED(err, {"path", path}, {"config", config});
     if (status == MHE_OK) {
         *config = NULL;
         status = check_set(__func__, set, n_set, err);
     }
-    return status == MHE_OK ? open_config(NULL, path, set, n_set, host, config, err) : status;
+    return status == MHE_OK ? open_config(NULL, path, set, n_set, flags, host, config, err)
+                            : status;
 }
 
 mhe_status mhe_config_parse(const char *name, const char *text, uint64_t length, const char *folder,
-                            const char *const *set, int32_t n_set, const mhe_host *host,
-                            mhe_config **config, mhe_error *err) {
+                            const char *const *set, int32_t n_set, uint32_t flags,
+                            const mhe_host *host, mhe_config **config, mhe_error *err) {
     mhe_status status = MHI_NEED(err, {"name", name}, {"text", text}, {"config", config});
     if (status == MHE_OK) {
         *config = NULL;
         status = check_set(__func__, set, n_set, err);
     }
     const mhi_run_text source = {.text = text, .length = length, .folder = folder};
-    return status == MHE_OK ? open_config(&source, name, set, n_set, host, config, err) : status;
+    return status == MHE_OK ? open_config(&source, name, set, n_set, flags, host, config, err)
+                            : status;
 }
 
 void mhe_config_close(mhe_config *c) {
@@ -74,6 +78,33 @@ void mhe_config_close(mhe_config *c) {
 
 const char *mhe_config_name(const mhe_config *c) {
     return c == NULL ? NULL : c->run->name;
+}
+
+int32_t mhe_config_plugin(const mhe_config *c, int32_t i, const char **id, const char **file) {
+    if (c == NULL || i < 0 || id == NULL || file == NULL) {
+        return 0;
+    }
+    const mhi_run *run = c->run;
+    const mhi_use *const parts[] = {&run->model, &run->muscle, &run->integrator, &run->solver};
+    const int32_t n_parts = (int32_t)(sizeof parts / sizeof parts[0]);
+    for (int32_t k = 0; k < n_parts + run->n_costs; k++) {
+        const mhe_plugin *p = (k < n_parts ? parts[k] : &run->costs[k - n_parts])->plugin;
+        int32_t before = 0;
+        for (int32_t j = n_parts; j < k && !before; j++) {
+            before = run->costs[j - n_parts].plugin == p;
+        }
+        if (!before && i-- == 0) {
+            *id = p->id;
+            return mhi_plugin_library(p, file, NULL) == MHE_OK;
+        }
+    }
+    return 0;
+}
+
+const char *mhe_config_dropped(const mhe_config *c, int32_t i) {
+    return c == NULL || c->model == NULL || i < 0 || i >= c->model->n_unsupported
+               ? NULL
+               : c->model->unsupported[i];
 }
 
 mhe_status mhi_config_model(mhe_config *c, const mhe_description **model, mhe_error *err) {
