@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* test_run.c: whole configurations, read with plugins of the tests' own. */
+#include "config/defaults.h"
 #include "config/options.h"
 #include "config/run.h"
 #include "support.h"
@@ -260,12 +261,12 @@ static void wrong_sections(void **state) {
     assert_refused(BASE COSTS "bounds: {excitation_min: 0.5, excitation_max: 0.4}\n",
                    ":7: bounds: 'excitation_min' is above 'excitation_max'");
     assert_refused(BASE, ": costs: a list with at least one entry is needed, like [{plugin: "
-                         "mhe.cost.emg-markers-high}]");
+                         "ID}]");
     assert_refused(BASE "costs: []\n", ":6: costs: a list with at least one entry is needed, like "
-                                       "[{plugin: mhe.cost.emg-markers-high}]");
+                                       "[{plugin: ID}]");
     assert_refused(BASE "costs: org.test.cost.b\n",
                    ":6: costs: a list with at least one entry is needed, like [{plugin: "
-                   "mhe.cost.emg-markers-high}]");
+                   "ID}]");
     assert_refused("- a\n", ":1: a configuration is a mapping of sections (model, costs, ...)");
     assert_refused("{plugin_path: plugins, model: org.test.model.a}\n",
                    ":1: model: the key 'file' is missing: Model file, .osim or .bioMod.");
@@ -411,8 +412,15 @@ static void tables_are_documented(void **state) {
             assert_string_equal(sections[i].options[0].key, "plugin");
         }
     }
-    const mhe_option *solver = mhi_run_section("solver", &n_options);
-    assert_string_equal(solver[0].text_default, "mhe.solver.ipopt");
+    /* what stands where no plugin is named is said by a file, not by the core */
+    mhi_arena arena = {0};
+    mhe_error err = {0};
+    const char *id = NULL;
+    assert_int_equal(mhi_default_plugin("solver", &arena, &id, &err), MHE_OK);
+    assert_string_equal(id, "mhe.solver.ipopt");
+    assert_int_equal(mhi_default_plugin("costs", &arena, &id, &err), MHE_OK);
+    assert_null(id);
+    mhi_arena_free(&arena);
     assert_null(mhi_run_section("nothing", &n_options));
     assert_int_equal(n_options, 0);
 }

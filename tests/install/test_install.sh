@@ -7,7 +7,10 @@ set -eu
 cmake=$1 cc=$2 source=$3 build=$4 libdir=$5 sanitizers=$6
 here=$source/tests/install
 work=$build/tests/install_package
-prefix=$work/moved
+# Outside of the build tree: what lies in that looks for plugins there too.
+elsewhere=$(mktemp -d)
+trap 'rm -rf "$elsewhere"' EXIT
+prefix=$elsewhere/moved
 id=org.example.cost.effort
 export CMAKE_BUILD_PARALLEL_LEVEL=2
 
@@ -92,7 +95,28 @@ run_with_plugin() {
     expect rest "$work/check.txt"
 }
 
+# Which plugin stands where a configuration names none is said by an installed file, not by the core.
+defaults() {
+    file=$prefix/share/mhe/defaults.yaml
+    cp "$file" "$work/defaults.yaml"
+    sed -i 's/^solver:.*/solver: mhe.solver.rti/' "$file"
+    "$prefix/bin/mhe-run" --describe config >"$work/describe.txt"
+    expect "mhe.solver.rti" "$work/describe.txt"
+    echo "sovler: x" >>"$file"
+    if "$prefix/bin/mhe-run" --check "$source/models/arm19/demo.yaml" --set solver= >"$work/check.txt" 2>&1; then
+        give_up "a wrong line in defaults.yaml is accepted"
+    fi
+    expect "defaults.yaml:8: defaults are lines like" "$work/check.txt"
+    rm "$file"
+    if "$prefix/bin/mhe-run" --check "$source/models/arm19/demo.yaml" --set solver= >"$work/check.txt" 2>&1; then
+        give_up "no plugin is named anywhere, yet one is used"
+    fi
+    expect "solver: the id of a plugin is missing" "$work/check.txt"
+    cp "$work/defaults.yaml" "$file"
+}
+
 install_and_move
+defaults
 build_project external_cost
 (cd "$work/external_cost" && ctest --output-on-failure) >"$work/ctest.log" || { cat "$work/ctest.log"; give_up ctest; }
 build_project external_app

@@ -11,7 +11,7 @@
 /* Fills `config` (zeroed, of the table's struct) from `mapping` (NULL or empty: all defaults). Keys
  * in `common` [n_common] belong to the caller and are passed over ("plugin", "weight"...). `what`
  * names the table in messages
- * ("mhe.solver.ipopt"). Paths become absolute with respect to `dir`. Strings and lists live in
+ * ("org.lab.solver.x"). Paths become absolute with respect to `dir`. Strings and lists live in
  * `arena`. MHE_E_CONFIG: unknown key (nearest valid key named), wrong type, out of range, required
  * key absent. [cold] */
 mhe_status mhi_options_fill(const mhe_option *options, int32_t n_options, const mhi_tree *tree,

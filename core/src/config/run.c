@@ -2,6 +2,7 @@
 /* run.c: from a configuration file to a checked description of the run. */
 #include "config/run.h"
 
+#include "config/defaults.h"
 #include "config/options.h"
 #include "config/options_value.h"
 #include "config/run_sections.h"
@@ -122,7 +123,13 @@ static mhe_status read_plain_sections(const struct reader *r) {
 static mhe_status find_plugin(const struct reader *r, const mhi_section *section,
                               const mhi_node *node, mhi_use *use) {
     const mhi_node *entry = mhi_node_find(node, "plugin");
-    const char *id = section->options[0].text_default; /* every such table starts with `plugin` */
+    const char *id = NULL;
+    if (entry == NULL && section->offset != 0) {
+        mhe_status status = mhi_default_plugin(section->name, &r->run->arena, &id, r->err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
     if (entry != NULL && entry->kind == MHI_SCALAR && !mhi_node_is_null(entry)) {
         id = entry->text;
     } else if (entry != NULL || id == NULL) {
@@ -210,7 +217,7 @@ static mhe_status read_costs(const struct reader *r, const mhi_node *owner, cons
     if (list == NULL || list->kind != MHI_SEQUENCE || list->first == NULL) {
         return mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, list != NULL ? list : owner,
                            "costs: a list with at least one entry is needed, like "
-                           "[{plugin: mhe.cost.emg-markers-high}]");
+                           "[{plugin: ID}]");
     }
     *n_uses = mhi_node_count(list);
     mhi_use *use = *uses = MHI_TAKE(&r->run->arena, mhi_use, *n_uses);

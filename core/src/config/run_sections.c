@@ -22,7 +22,7 @@ static const mhe_option top_options[] = {
 };
 
 static const mhe_option model_options[] = {
-    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.model.simbody", "Plugin of the skeleton."),
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, NULL, "Plugin of the skeleton."),
     MHE_OPT_PATH(mhi_use_section, file, MHE_OPT_REQUIRED, "Model file, .osim or .bioMod."),
     MHE_OPT_ENUM(mhi_use_section, unsupported, "stop", "stop|warn",
                  "What to do when the model file holds something that cannot be represented."),
@@ -34,7 +34,7 @@ static const mhe_option model_options[] = {
 };
 
 static const mhe_option muscle_options[] = {
-    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.muscle.hill", "Plugin of the muscles."),
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, NULL, "Plugin of the muscles."),
 };
 
 static const mhe_option data_options[] = {
@@ -45,7 +45,7 @@ static const mhe_option data_options[] = {
                  "with emg.channels."),
     MHE_OPT_PATH(mhi_data_section, angles, 0,
                  "Measured joint angles, .sto or .mot, a column a coordinate: what the signal q is "
-                 "to be close to in mhe.cost.track, beside markers or in their place."),
+                 "to be close to where a cost compares it, beside markers or in their place."),
     MHE_OPT_PATH(mhi_data_section, reference, 0,
                  "Known motion to start from and to compare with, .sto."),
     MHE_OPT_REAL(mhi_data_section, emg_offset, 0, -1e6, 1e6, "s",
@@ -149,7 +149,7 @@ static const mhe_option bounds_options[] = {
 };
 
 static const mhe_option integrator_options[] = {
-    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.integrator.rk", "Plugin of the integrator."),
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, NULL, "Plugin of the integrator."),
 };
 
 static const mhe_option cost_options[] = {
@@ -163,7 +163,7 @@ static const mhe_option cost_options[] = {
 };
 
 static const mhe_option solver_options[] = {
-    MHE_OPT_TEXT(mhi_use_section, plugin, 0, "mhe.solver.ipopt", "Plugin of the solver."),
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, NULL, "Plugin of the solver."),
 };
 
 static const mhe_option realtime_options[] = {
