@@ -59,9 +59,9 @@ static void live_is_as_recorded(void **state) {
         double values[MUSCLES];
         for (; next < ROWS && next / 1000.0 + 0.25 <= r->time[k] + 1e-6; next++) {
             const double sample[] = {raw_at(next, 0), raw_at(next, 1), raw_at(next, 2)};
-            mhe_emg_push(live, next / 1000.0, sample);
+            assert_int_equal(mhe_emg_push(live, next / 1000.0, sample, &f.err), MHE_OK);
         }
-        mhe_emg_at(live, r->time[k], values);
+        assert_int_equal(mhe_emg_at(live, r->time[k], values, MUSCLES, &f.err), MHE_OK);
         for (int32_t i = 0; i < MUSCLES; i++) {
             const double recorded = r->emg[(ptrdiff_t)k * MUSCLES + i];
             assert_true(values[i] == recorded || (isnan(values[i]) && isnan(recorded)));
@@ -69,6 +69,12 @@ static void live_is_as_recorded(void **state) {
         }
     }
     assert_true(compared > 3 * 250);
+    double few[3] = {7, 7, 7}; /* no more than there is room for */
+    assert_int_equal(mhe_emg_at(live, 1, few, 2, &f.err), MHE_OK);
+    assert_true(few[2] == 7);
+    assert_int_equal(mhe_emg_at(live, 1, NULL, 2, &f.err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_emg_at(live, 1, few, -1, &f.err), MHE_E_ARGUMENT);
+    assert_int_equal(mhe_emg_push(live, 1, NULL, &f.err), MHE_E_ARGUMENT);
     mhe_emg_close(live);
     const char *set = "emg.zero_phase=true";
     assert_int_equal(mhe_emg_open(path, &set, 1, columns, 3, 1000, NULL, &live, &f.err),

@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* emg.h: raw EMG of electrodes as the EMG of muscles that a frame holds, live.
+/* emg.h: raw EMG of electrodes as the EMG of muscles that a frame holds, live, for programs that
+ * want the EMG itself. Who only estimates gives the samples to the estimator
+ * (mhe_estimator_push_emg).
  *
  *     mhe_emg *emg;
  *     mhe_emg_open("arm.yaml", NULL, 0, columns, n_columns, 2000, NULL, &emg, &err);
- *     for each sample:  mhe_emg_push(emg, time, raw);
- *     for each frame:   mhe_emg_at(emg, frame.time, values); frame.emg = values;
+ *     for each sample:  mhe_emg_push(emg, time, raw, &err);
+ *     for each frame:   mhe_emg_at(emg, frame.time, values, n_muscles, &err); frame.emg = values;
  *     mhe_emg_close(emg);
  *
  * Filters, normalisation, gains and muscles are those of the config's section `emg`. mhe-run takes
@@ -33,11 +35,12 @@ MHE_API void mhe_emg_close(mhe_emg *emg); /* NULL is fine. [cold] */
 
 /* The next sample: raw [n_columns], in the columns' units, NaN where missing; time in s. A time
  * that does not increase is passed over; a step over samples is a gap. Allocates nothing. [cold] */
-MHE_API void mhe_emg_push(mhe_emg *emg, double time, const double *raw);
+MHE_API mhe_status mhe_emg_push(mhe_emg *emg, double time, const double *raw, mhe_error *err);
 
-/* Normalised EMG [n_muscles of the model] of a frame: the newest there is at or before its time.
+/* Normalised EMG of a frame, of the model's muscles in their order, the first n of them where there
+ * are more: the newest there is at or before its time.
  * NaN: a muscle without an electrode, a gap, filters that still fill. Allocates nothing. [cold] */
-MHE_API void mhe_emg_at(const mhe_emg *emg, double time, double *values);
+MHE_API mhe_status mhe_emg_at(mhe_emg *emg, double time, double *values, int32_t n, mhe_error *err);
 
 /* s by which the values come late: the filters' group delay less the electromechanical delay. [any]
  */

@@ -250,6 +250,24 @@ MHE_API mhe_status mhe_estimator_counts(const mhe_estimator *estimator, int32_t 
 MHE_API mhe_status mhe_estimator_measure(mhe_estimator *estimator, int32_t channel, double time,
                                          const double *values, mhe_error *err);
 
+/* Raw EMG of electrodes, which the section `emg` of the config makes into that of the muscles: with
+ * it an application has this one object. For samples of `columns` [n_columns], among which the
+ * config's channels must be, at `rate` (Hz); before the first push. Frames then bring no EMG of
+ * their own. MHE_E_CONFIG, MHE_E_INPUT: err->text says what; also where there are no emg.channels,
+ * or they ask for zero_phase. [cold] */
+MHE_API mhe_status mhe_estimator_open_emg(mhe_estimator *estimator, const char *const *columns,
+                                          int32_t n_columns, double rate, mhe_error *err);
+/* The next sample: raw [n_columns], in the columns' units, NaN where missing; time in s. It may
+ * come before the frames of its time or after them, in packets too: a frame's EMG counts from the
+ * first solve on that follows the last sample it needs, as long as its node is in the window. A
+ * time that does not increase is passed over; a step over samples is a gap. The same samples give
+ * the same EMG as those of a recording, to the bit. [cold] */
+MHE_API mhe_status mhe_estimator_push_emg(mhe_estimator *estimator, double time, const double *raw,
+                                          mhe_error *err);
+/* s by which that EMG comes late: the filters' group delay less the electromechanical delay. [any]
+ */
+MHE_API double mhe_estimator_emg_lag(const mhe_estimator *estimator);
+
 /* Does what can be done before the next frame comes: shifts the window, linearises it where the
  * solver can. May be called after each push; push does itself what was not done. [cold] */
 MHE_API mhe_status mhe_estimator_prepare(mhe_estimator *estimator, mhe_error *err);

@@ -51,6 +51,12 @@ double mhi_electrodes_lag(const mhi_electrodes *electrodes);
 mhe_status mhi_electrodes_mvc(const mhi_run *run, const mhe_description *model, double *mvc,
                               mhe_error *err);
 
+/* For samples that come live: with the MVC that the config says. MHE_E_CONFIG: there are no
+ * channels, or they ask for what looks ahead. [cold] */
+mhe_status mhi_electrodes_open_live(const mhi_run *run, const mhe_description *model,
+                                    const char *const *columns, int32_t n_columns, double rate,
+                                    mhi_electrodes **electrodes, mhe_error *err);
+
 /* What became of a recording. */
 typedef struct mhi_emg_report {
     int32_t n_channels;               /* 0: the columns are muscles; the rest is 0 then */

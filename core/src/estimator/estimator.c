@@ -224,6 +224,7 @@ void mhe_estimator_close(mhe_estimator *e) {
     mhi_ocp_free(e->ocp);
     mhi_system_free(e->system);
     mhi_description_free(e->owned_description);
+    mhi_electrodes_close(e->feed.electrodes);
     mhe_config_close(e->config);
     mhi_arena_free(&e->arena);
     free(e);

@@ -14,6 +14,7 @@
 #include "estimator/channel.h"
 #include "estimator/clock.h"
 #include "estimator/create.h"
+#include "estimator/feed.h"
 #include "estimator/output.h"
 #include "estimator/trust.h"
 #include "estimator/window.h"
@@ -34,6 +35,7 @@ struct mhe_estimator {
     const mhe_host *host;
     mhe_config *config; /* its own; NULL where it was lent */
     atomic_int stopped; /* mhe_estimator_stop */
+    mhi_feed feed;
     const mhi_run *run;
     mhe_description *owned_description; /* NULL where it was lent */
     const mhe_description *description;

@@ -183,6 +183,9 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     if (status != MHE_OK) {
         return status;
     }
+    if (ours.emg == NULL && e->feed.electrodes != NULL) {
+        ours.emg = mhi_feed_of_frame(&e->feed, ours.time);
+    }
     take_frame(e, &ours, used);
     if (!used || e->window.filled <= e->window.n) {
         return MHE_OK;
