@@ -17,9 +17,11 @@
 #define SIZE(T, bytes) static_assert(sizeof(T) == (bytes), "size of " #T)
 #define AT(T, field, bytes) static_assert(offsetof(T, field) == (bytes), #T "." #field)
 
-SIZE(mhe_error, 772);
+SIZE(mhe_error, 780);
 AT(mhe_error, code, 0);
 AT(mhe_error, text, 4);
+AT(mhe_error, part, 772);
+AT(mhe_error, entry, 776);
 
 SIZE(mhe_host, 32);
 AT(mhe_host, size, 0);

@@ -57,10 +57,21 @@ enum {
 
 #define MHE_ERROR_TEXT 768
 
+/* Whose refusal an error is. */
+#define MHE_PART_NONE 0
+#define MHE_PART_MODEL 1
+#define MHE_PART_MUSCLE 2
+#define MHE_PART_INTEGRATOR 3
+#define MHE_PART_SOLVER 4
+#define MHE_PART_COST 5  /* number `entry` of the list */
+#define MHE_PART_FORCE 6 /* number `entry` of the list */
+
 /* Detail of a failure, owned by the caller; may be NULL wherever it is taken. [any] */
 typedef struct mhe_error {
     int32_t code;
     char text[MHE_ERROR_TEXT]; /* one line, no trailing newline */
+    int32_t part;  /* MHE_PART_*: the plugin that refused; the core sets it, mhe_fail leaves it */
+    int32_t entry; /* of a list, from 0 */
 } mhe_error;
 
 /* Writes the detail and returns `code`, so that `return mhe_fail(...)` reads well. A NULL `err` is

@@ -31,22 +31,20 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
     return mhi_estimator_lock(run, *description, err);
 }
 
-/* A plugin's refusal to be created begins with its id, that of a cost with "costs.<position>: ":
- * puts the line of the config before it. */
+/* Puts the line of the config before the refusal of a plugin, which err->part names. */
 static mhe_status locate(const mhi_run *run, mhe_status status, mhe_error *err) {
-    const mhi_use *const parts[] = {&run->model, &run->muscle, &run->integrator, &run->solver};
+    const mhi_use *const parts[] = {[MHE_PART_MODEL] = &run->model,
+                                    [MHE_PART_MUSCLE] = &run->muscle,
+                                    [MHE_PART_INTEGRATOR] = &run->integrator,
+                                    [MHE_PART_SOLVER] = &run->solver};
     const mhi_use *found = NULL;
-    int position = -1;
     if (err == NULL) {
         return status;
     }
-    if (sscanf(err->text, "costs.%d: ", &position) == 1 && position < run->n_costs) {
-        found = &run->costs[position];
-    }
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0] && found == NULL; i++) {
-        const size_t length = strlen(parts[i]->plugin->id);
-        const int same = strncmp(err->text, parts[i]->plugin->id, length) == 0;
-        found = same && err->text[length] == ':' ? parts[i] : NULL;
+    if (err->part == MHE_PART_COST && err->entry >= 0 && err->entry < run->n_costs) {
+        found = &run->costs[err->entry];
+    } else if (err->part > MHE_PART_NONE && err->part <= MHE_PART_SOLVER) {
+        found = parts[err->part];
     }
     if (found == NULL) {
         return status;
@@ -177,6 +175,9 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
     }
     e->description = description == NULL ? e->owned_description : description;
     if (status == MHE_OK) {
+        if (err != NULL) {
+            err->part = MHE_PART_NONE; /* of an earlier failure */
+        }
         status = create_problem(e, err);
         status = status == MHE_OK ? MHE_OK : locate(run, status, err);
     }

@@ -233,6 +233,8 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
     ocp->n_terms_created = i + 1;
     if (status != MHE_OK && err != NULL) {
         const mhe_error why = *err;
+        err->part = MHE_PART_COST;
+        err->entry = i;
         return mhe_fail(err, status, "costs.%d: %.700s", i, why.text);
     }
     return status;

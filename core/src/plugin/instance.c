@@ -15,12 +15,15 @@ typedef struct call {
     mhe_error *err;
 } call;
 
-static mhe_status guarded(mhe_status (*function)(void *), const mhe_plugin *plugin, call *c) {
+/* `part`: MHE_PART_*, whose refusal it is; which entry of a list, the caller knows. */
+static mhe_status guarded(mhe_status (*function)(void *), int32_t part, const mhe_plugin *plugin,
+                          call *c) {
     *c->self = NULL;
     c->ops = plugin->ops;
     mhe_status status = mhi_guard(function, c, c->err);
     if (status != MHE_OK && c->err != NULL) {
         const mhe_error why = *c->err;
+        c->err->part = part;
         return mhe_fail(c->err, status, "%s: %.600s", plugin->id, why.text);
     }
     return status;
@@ -82,7 +85,7 @@ mhe_status mhi_model_create(const mhe_plugin *plugin, const mhe_host *host,
                             const mhe_description *description, const void *config, void **self,
                             mhe_error *err) {
     call c = {.host = host, .subject = description, .config = config, .self = self, .err = err};
-    return guarded(create_model, plugin, &c);
+    return guarded(create_model, MHE_PART_MODEL, plugin, &c);
 }
 
 mhe_status mhi_muscle_create(const mhe_plugin *plugin, const mhe_host *host,
@@ -96,7 +99,7 @@ mhe_status mhi_muscle_create(const mhe_plugin *plugin, const mhe_host *host,
               .layout = layout,
               .err = err};
     *layout = (mhe_muscle_layout){.size = sizeof *layout};
-    return guarded(create_muscle, plugin, &c);
+    return guarded(create_muscle, MHE_PART_MUSCLE, plugin, &c);
 }
 
 mhe_status mhi_force_create(const mhe_plugin *plugin, const mhe_host *host,
@@ -109,21 +112,21 @@ mhe_status mhi_force_create(const mhe_plugin *plugin, const mhe_host *host,
               .layout = layout,
               .err = err};
     *layout = (mhe_force_layout){.size = sizeof *layout};
-    return guarded(create_force, plugin, &c);
+    return guarded(create_force, MHE_PART_FORCE, plugin, &c);
 }
 
 mhe_status mhi_integrator_create(const mhe_plugin *plugin, const mhe_host *host,
                                  const mhe_system *system, const void *config, void **self,
                                  mhe_error *err) {
     call c = {.host = host, .subject = system, .config = config, .self = self, .err = err};
-    return guarded(create_integrator, plugin, &c);
+    return guarded(create_integrator, MHE_PART_INTEGRATOR, plugin, &c);
 }
 
 mhe_status mhi_solver_create(const mhe_plugin *plugin, const mhe_host *host,
                              const mhe_stage_problem *problem, const void *config, void **self,
                              mhe_error *err) {
     call c = {.host = host, .subject = problem, .config = config, .self = self, .err = err};
-    return guarded(create_solver, plugin, &c);
+    return guarded(create_solver, MHE_PART_SOLVER, plugin, &c);
 }
 
 mhe_status mhi_cost_create(const mhe_plugin *plugin, const mhe_host *host,
@@ -136,5 +139,5 @@ mhe_status mhi_cost_create(const mhe_plugin *plugin, const mhe_host *host,
               .layout = layout,
               .err = err};
     *layout = (mhe_cost_layout){.size = sizeof *layout};
-    return guarded(create_cost, plugin, &c);
+    return guarded(create_cost, MHE_PART_COST, plugin, &c);
 }
