@@ -100,7 +100,9 @@ mhe_status gather(const study *s, const rows *r, const char *dir, mhe_error *err
     add_head(s, &results);
     mhi_text_add(&results, ",seed,counted");
     for (int32_t i = 0; i < N_RUN_COLUMNS; i++) {
-        mhi_text_add(&results, is_factor(s, run_columns[i]) ? "" : ",%s", run_columns[i]);
+        if (!is_factor(s, run_columns[i])) {
+            mhi_text_add(&results, ",%s", run_columns[i]);
+        }
     }
     mhi_text_add(&results, "," TRIAL_RESULT_COLUMNS ",reason\n");
     add_head(s, &timing);

@@ -55,7 +55,8 @@ static void note_time(mhe_outbox *outbox) {
 
 static int is_temporary(const char *name) {
     const size_t n = strlen(name), n_mark = strlen(MHI_OUTBOX_MARK), n_end = strlen(MHI_OUTBOX_END);
-    if (name[0] != '.' || n < 1 + n_mark + 8 + n_end || strcmp(name + n - n_end, MHI_OUTBOX_END)) {
+    if (name[0] != '.' || n < 1 + n_mark + 8 + n_end ||
+        strcmp(name + n - n_end, MHI_OUTBOX_END) != 0) {
         return 0;
     }
     const char *digits = name + n - n_end - 8;

@@ -13,9 +13,10 @@ typedef struct mhi_registry mhi_registry;
 const mhe_host *mhi_host_or_silent(const mhe_host *host);
 
 /* An empty registry that already knows its standard folders: MHE_PLUGIN_PATH (':' between folders;
- * not looked at by programs with raised privileges), the installed <libdir>/mhe/plugins/abi0 as seen
- * from libmhe.so (place.h), for what lies in the build tree its plugin folder. They are scanned at
- * the first look-up; what everybody may write to is refused. `host` is lent for life. [cold] */
+ * not looked at by programs with raised privileges), the installed <libdir>/mhe/plugins/abi0 as
+ * seen from libmhe.so (place.h), for what lies in the build tree its plugin folder. They are
+ * scanned at the first look-up; what everybody may write to is refused. `host` is lent for life.
+ * [cold] */
 mhe_status mhi_registry_create(const mhe_host *host, mhi_registry **registry, mhe_error *err);
 void mhi_registry_free(mhi_registry *registry); /* libraries stay loaded until exit */
 
@@ -29,9 +30,10 @@ int32_t mhi_registry_trusts_files(const mhi_registry *registry);
 mhe_status mhi_registry_add_folder(mhi_registry *registry, const char *folder, mhe_error *err);
 
 /* An empty registry that already knows its standard folders: MHE_PLUGIN_PATH (':' between folders;
- * not looked at by programs with raised privileges), the installed <libdir>/mhe/plugins/abi0 as seen
- * from libmhe.so (place.h), for what lies in the build tree its plugin folder. They are scanned at
- * the first look-up; what everybody may write to is refused. `host` is lent for life. [cold] */
+ * not looked at by programs with raised privileges), the installed <libdir>/mhe/plugins/abi0 as
+ * seen from libmhe.so (place.h), for what lies in the build tree its plugin folder. They are
+ * scanned at the first look-up; what everybody may write to is refused. `host` is lent for life.
+ * [cold] */
 mhe_status mhi_registry_find(mhi_registry *registry, const char *id, const char *iface,
                              const mhe_plugin **plugin, mhe_error *err);
 
