@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "console.h"
 
-#include <mhe/version.h>
 #include <signal.h>
-#include <string.h>
 
 static void log_line(const mhe_host *host, int32_t level, const char *text) {
     static const char *const names[] = {"error", "warning", "note", "debug"};
@@ -64,50 +62,4 @@ mhe_status console_print(mhi_text *text, mhe_error *err) {
     }
     mhi_text_free(text);
     return status;
-}
-
-mhe_status console_value(int argc, char **argv, int *i, const char **value, mhe_error *err) {
-    if (*i + 1 >= argc || argv[*i + 1][0] == '\0') {
-        return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", argv[*i]);
-    }
-    *value = argv[++*i];
-    return MHE_OK;
-}
-
-mhe_status console_config(const char *word, const char *const *options, int32_t n,
-                          const char **config, mhe_error *err) {
-    char hint[256];
-    if (word[0] == '-' && word[1] != '\0') {
-        return mhe_fail(err, MHE_E_ARGUMENT, "unknown option '%s'%s", word,
-                        mhi_suggest(hint, sizeof hint, word, options, n));
-    }
-    if (*config != NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "one config file at a time: '%s' and '%s'", *config,
-                        word);
-    }
-    *config = word;
-    return MHE_OK;
-}
-
-mhe_status console_command(const char *program, const char *help, const char *const *names,
-                           int32_t n, const char *word, int32_t *chosen, mhe_error *err) {
-    char hint[256];
-    *chosen = -1;
-    for (int32_t i = 0; i < n && word != NULL; i++) {
-        *chosen = strcmp(word, names[i]) == 0 ? i : *chosen;
-    }
-    if (*chosen >= 0) {
-        return MHE_OK;
-    }
-    if (word != NULL && strcmp(word, "--version") == 0) {
-        (void)printf("%s %s\n", program, MHE_VERSION);
-        return MHE_OK;
-    }
-    if (word != NULL && (strcmp(word, "--help") == 0 || strcmp(word, "-h") == 0)) {
-        (void)fputs(help, stdout);
-        return MHE_OK;
-    }
-    (void)mhi_suggest(hint, sizeof hint, word == NULL ? "" : word, names, n);
-    return word == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "no command is given%s", hint)
-                        : mhe_fail(err, MHE_E_ARGUMENT, "unknown command '%s'%s", word, hint);
 }

@@ -3,26 +3,17 @@
 #ifndef ARGUMENTS_H
 #define ARGUMENTS_H
 
-#include <mhe/abi.h>
-
-#define MODE_BENCH 0
-#define MODE_HELP 1
-#define MODE_VERSION 2
+#include "words.h"
 
 typedef struct arguments {
-    int mode;
-    int quick;
+    int32_t mode; /* 0 */
+    int32_t quick;
     int32_t repeats; /* 0: not given */
     const char *config;
-    const char *out;          /* NULL: ./out/<config name> */
-    const char **set, **vary; /* [n_set], [n_vary], point into argv */
-    int32_t n_set, n_vary;
+    const char *out; /* NULL: ./out/<config name> */
+    words_list set, vary, others;
 } arguments;
 
-/* MHE_E_ARGUMENT: `err` says which word is wrong and what is valid. */
-mhe_status arguments_parse(int argc, char **argv, arguments *result, mhe_error *err);
-void arguments_free(arguments *a);
-
-extern const char arguments_help[];
+extern const words_program arguments_program;
 
 #endif

@@ -6,7 +6,6 @@
 #include "report.h"
 #include <mhe/outbox.h>
 
-#include <mhe/version.h>
 #include <stdlib.h>
 
 #define REPEATS 5
@@ -84,8 +83,9 @@ static mhe_status run(const arguments *a, const mhe_host *host, mhe_error *err) 
         return status;
     }
     variants v;
-    status = variants_read(a->config, a->set, a->n_set, a->n_vary > 0 ? a->vary : windows,
-                           a->n_vary > 0 ? a->n_vary : 1, registry, &v, err);
+    status =
+        variants_read(a->config, a->set.values, a->set.n, a->vary.n > 0 ? a->vary.values : windows,
+                      a->vary.n > 0 ? a->vary.n : 1, registry, &v, err);
     if (status == MHE_OK) {
         status = measure(a, &v, host, err);
     }
@@ -96,16 +96,13 @@ static mhe_status run(const arguments *a, const mhe_host *host, mhe_error *err) 
 
 int main(int argc, char **argv) {
     const mhe_host host = console_host("mhe-bench");
-    arguments a;
+    arguments a = {0};
     mhe_error err = {0};
-    mhe_status status = arguments_parse(argc, argv, &a, &err);
-    if (status == MHE_OK && a.mode == MODE_HELP) {
-        (void)fputs(arguments_help, stdout);
-    } else if (status == MHE_OK && a.mode == MODE_VERSION) {
-        (void)printf("mhe-bench %s\n", MHE_VERSION);
-    } else if (status == MHE_OK) {
+    int32_t command = 0, outcome = WORDS_RUN;
+    mhe_status status = words_parse(&arguments_program, argc, argv, &a, &command, &outcome, &err);
+    if (status == MHE_OK && outcome == WORDS_RUN) {
         status = run(&a, &host, &err);
     }
-    arguments_free(&a);
+    words_free(&arguments_program, &a);
     return console_end("mhe-bench", status, &err);
 }

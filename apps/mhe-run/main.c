@@ -6,8 +6,6 @@
 
 #include <mhe/library.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 static mhe_status show_plugins(const arguments *a, const mhe_host *host, mhe_error *err) {
     char *text = NULL;
@@ -23,7 +21,7 @@ static mhe_status show_plugins(const arguments *a, const mhe_host *host, mhe_err
 
 static mhe_status run_config(const arguments *a, const mhe_host *host, mhe_error *err) {
     mhe_config *config = NULL;
-    mhe_status status = mhe_config_read(a->config, a->set, a->n_set,
+    mhe_status status = mhe_config_read(a->config, a->set.values, a->set.n,
                                         a->trust ? MHE_CONFIG_TRUST : 0, host, &config, err);
     if (status != MHE_OK) {
         return status;
@@ -53,17 +51,14 @@ static mhe_status run_config(const arguments *a, const mhe_host *host, mhe_error
 
 int main(int argc, char **argv) {
     const mhe_host host = console_host("mhe-run");
-    arguments a;
+    arguments a = {0};
     mhe_error err = {0};
-    mhe_status status = arguments_parse(argc, argv, &a, &err);
-    if (status == MHE_OK && a.mode == MODE_HELP) {
-        (void)fputs(arguments_help, stdout);
-    } else if (status == MHE_OK && a.mode == MODE_VERSION) {
-        (void)printf("mhe-run %s\n", mhe_version());
-    } else if (status == MHE_OK) {
+    int32_t command = 0, outcome = WORDS_RUN;
+    mhe_status status = words_parse(&arguments_program, argc, argv, &a, &command, &outcome, &err);
+    if (status == MHE_OK && outcome == WORDS_RUN) {
         status = a.mode == MODE_LIST || a.mode == MODE_DESCRIBE ? show_plugins(&a, &host, &err)
                                                                 : run_config(&a, &host, &err);
     }
-    free(a.set);
+    words_free(&arguments_program, &a);
     return console_end("mhe-run", status, &err);
 }

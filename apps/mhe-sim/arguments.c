@@ -1,102 +1,98 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "arguments.h"
 
-#include "console.h"
-
 #include <stdlib.h>
-#include <string.h>
 
-#define WORDS_MAX 6
+#define INPUT_NEEDED "a config file and --input are needed; 'mhe-sim --help'"
 
-/* Words of a command that takes this, into words [WORDS_MAX]. */
-static int32_t choose_words(int32_t takes, const char **words) {
-    static const struct {
-        const char *word;
-        int32_t needs;
-    } all[WORDS_MAX] = {{"--out", 0},
-                        {"--set", 0},
-                        {"--help", 0},
-                        {"--input", ARGUMENTS_INPUT},
-                        {"--rate", ARGUMENTS_INPUT},
-                        {"--no-cache", ARGUMENTS_CACHE}};
-    int32_t n = 0;
-    for (int32_t i = 0; i < WORDS_MAX; i++) {
-        if ((all[i].needs & ~takes) == 0) {
-            words[n++] = all[i].word;
-        }
-    }
-    return n;
-}
+static const words_command commands[] = {
+    {"forward", "CONFIG.yaml", "config file",
+     "from the config's initial state under the excitations of the file (one column a muscle, "
+     "linear between rows); writes reference.sto (the truth), markers.trc and emg.sto",
+     1, INPUT_NEEDED},
+    {"follow", "CONFIG.yaml", "config file",
+     "through the postures of the file (one column a coordinate, a minimum-jerk path from row to "
+     "row) with muscle controls that the config's costs and solver find on the way; writes the "
+     "same files",
+     1, INPUT_NEEDED},
+    {"reference", "CONFIG.yaml", "config file",
+     "optimal motions, the config's steps one after the other; for every step with an output "
+     "reference.sto, forces.sto, markers.trc and emg.sto in a folder of its own, and motion.svg "
+     "that shows them all; 'mhe-sim reference --help' shows every key of a step",
+     1, "a config file is needed; 'mhe-sim --help'"},
+    {"noise", "CONFIG.yaml", "config file",
+     "markers.trc and emg.sto as instruments with errors would have recorded them of such a "
+     "reference.sto; where the config has electrodes also recording.c3d, markers and raw EMG; "
+     "noise.yaml says what was applied, noise.svg shows it; 'mhe-sim noise --help' shows every "
+     "key of its config",
+     1, "a config file is needed; 'mhe-sim --help'"}};
 
-static mhe_status read_rate(const char *text, double *rate, mhe_error *err) {
+#define AT(field) offsetof(arguments, field)
+#define MOTIONS (1u << COMMAND_FORWARD | 1u << COMMAND_FOLLOW)
+
+static mhe_status take_rate(const char *word, const char *value, void *target, mhe_error *err) {
     char *end = NULL;
-    *rate = strtod(text, &end);
-    if (end == text || *end != '\0' || !(*rate > 0 && *rate <= 1e5)) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "--rate '%s': a number of Hz above 0 is needed", text);
+    const double rate = strtod(value, &end);
+    if (end == value || *end != '\0' || !(rate > 0 && rate <= 1e5)) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "%s '%s': a number of Hz above 0 is needed", word,
+                        value);
     }
+    *(double *)target = rate;
     return MHE_OK;
 }
 
-static mhe_status take_option(const char *word, const char *value, int32_t takes, arguments *a,
-                              mhe_error *err) {
-    const char *words[WORDS_MAX];
-    const int32_t n_words = choose_words(takes, words);
-    int32_t known = 0;
-    for (int32_t i = 0; i < n_words; i++) {
-        known = known || strcmp(word, words[i]) == 0;
-    }
-    if (!known) {
-        return console_config(word, words, n_words, &a->config, err);
-    }
-    if (strcmp(word, "--no-cache") == 0) {
-        a->no_cache = 1;
-        return MHE_OK;
-    }
-    if (value == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "%s needs a value", word);
-    }
-    if (strcmp(word, "--rate") == 0) {
-        return read_rate(value, &a->rate, err);
-    }
-    if (strcmp(word, "--set") == 0) {
-        a->set[a->n_set++] = value;
-    } else {
-        *(strcmp(word, "--input") == 0 ? &a->input : &a->out) = value;
-    }
-    return MHE_OK;
-}
+static const words_option options[] = {
+    {.name = "--out",
+     .value = "DIR",
+     .help = "default ./out/<config name>; of a motion ./out/<config name>-sim",
+     .kind = WORDS_TEXT,
+     .at = AT(out)},
+    {.name = "--set",
+     .value = "path.to.key=value",
+     .help = "replaces a key of the config; may be given often",
+     .kind = WORDS_LIST,
+     .at = AT(set)},
+    {.name = "--input",
+     .value = "FILE.sto",
+     .help = "excitations to act with, or postures to go through",
+     .commands = MOTIONS,
+     .kind = WORDS_TEXT,
+     .at = AT(input)},
+    {.name = "--rate",
+     .value = "HZ",
+     .help = "rows a second (100)",
+     .commands = MOTIONS,
+     .kind = WORDS_OTHER,
+     .at = AT(rate),
+     .take = take_rate},
+    {.name = "--no-cache",
+     .help = "solves all steps and keeps none; else a step that was solved before, from the same "
+             "config, "
+             "model, files and program, is read back from $XDG_CACHE_HOME/mhe (~/.cache/mhe), "
+             "which may be "
+             "deleted at any time",
+     .commands = 1u << COMMAND_REFERENCE,
+     .kind = WORDS_FLAG,
+     .at = AT(no_cache),
+     .low = 1}};
 
-mhe_status arguments_parse(int argc, char **argv, int32_t takes, arguments *a, mhe_error *err) {
-    *a = (arguments){.rate = 100, .set = calloc((size_t)argc, sizeof(char *))};
-    if (a->set == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    for (int i = 2; i < argc; i++) {
-        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
-            a->help = 1;
-            return MHE_OK;
-        }
-    }
-    mhe_status status = MHE_OK;
-    for (int i = 2; i < argc && status == MHE_OK; i++) {
-        if (argv[i][0] == '-') {
-            status = take_option(argv[i], i + 1 < argc ? argv[i + 1] : NULL, takes, a, err);
-            i += strcmp(argv[i], "--no-cache") != 0; /* the only one without a value */
-        } else {
-            status = console_config(argv[i], NULL, 0, &a->config, err);
-        }
-    }
-    if (status == MHE_OK &&
-        (a->config == NULL || ((takes & ARGUMENTS_INPUT) && a->input == NULL))) {
-        status = mhe_fail(err, MHE_E_ARGUMENT, "a config file%s needed; 'mhe-sim --help'",
-                          takes & ARGUMENTS_INPUT ? " and --input are" : " is");
-    }
-    return status;
-}
-
-void arguments_free(arguments *a) {
-    free(a->set);
-}
+const words_program arguments_program = {
+    .name = "mhe-sim",
+    .summary =
+        "Simulates motions of a musculoskeletal model (CVODES carries the state), and recordings.",
+    .usage = "  mhe-sim forward CONFIG.yaml --input EXCITATIONS.sto [--rate HZ] [options]\n"
+             "  mhe-sim follow CONFIG.yaml --input POSTURES.sto [--rate HZ] [options]\n"
+             "  mhe-sim reference CONFIG.yaml [options]\n"
+             "  mhe-sim noise CONFIG.yaml [options]\n"
+             "  mhe-sim --version | --help\n",
+    .notes = "Exit status: 0 done; 1 failed; 2 the command line or an input is wrong.\n",
+    .commands = commands,
+    .n_commands = sizeof commands / sizeof commands[0],
+    .options = options,
+    .n_options = sizeof options / sizeof options[0],
+    .mode = AT(mode),
+    .operand = AT(config),
+    .others = AT(others)};
 
 mhe_status arguments_folder(const arguments *a, const char *name, const char *suffix, char *out,
                             size_t size, mhe_error *err) {

@@ -183,9 +183,9 @@ static mhe_status gather_all(session *s, mhe_error *err) {
 mhe_status report_make(const arguments *a, const mhe_host *host, mhe_error *err) {
     session s = {.lock = -1};
     mhe_status status = MHE_OK;
-    if (a->n_others > 0) {
+    if (a->others.n > 0) {
         return mhe_fail(err, MHE_E_ARGUMENT, "one results folder at a time: '%s' and '%s'", a->file,
-                        a->others[0]);
+                        a->others.values[0]);
     }
     status = session_reopen(&s, a->file, host, err);
     status = status == MHE_OK ? gather_all(&s, err) : status;

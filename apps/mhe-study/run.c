@@ -31,7 +31,7 @@ static mhe_status missing_tasks(session *s, const arguments *a, task **tasks, in
     *tasks = all;
     for (int32_t i = 0; i < st->n_trials; i++) {
         const task t = all[i];
-        const int ours = i % a->n_shards == a->shard;
+        const int ours = i % a->shard.n == a->shard.i;
         *n_shard += ours;
         if (ours && !done[first[t.condition] + t.trial]) {
             all[(*n)++] = t; /* never before the place that is read next */
@@ -120,8 +120,8 @@ static void tell_checked(const session *s, const arguments *a) {
 mhe_status run_study(const arguments *a, const mhe_host *host, mhe_error *err) {
     session s = {.lock = -1};
     char own[40];
-    (void)snprintf(own, sizeof own, "%dof%d", (int)a->shard, (int)a->n_shards);
-    mhe_status status = session_read(&s, a->file, a->set, a->n_set, host, err);
+    (void)snprintf(own, sizeof own, "%dof%d", (int)a->shard.i, (int)a->shard.n);
+    mhe_status status = session_read(&s, a->file, a->set.values, a->set.n, host, err);
     if (status == MHE_OK && a->check) {
         status = session_check(&s, err);
         if (status == MHE_OK) {
@@ -165,8 +165,8 @@ static mhe_status take_all(session *s, const arguments *a, mhe_error *err) {
     int32_t n_taken = 0;
     mhe_status status = session_take_shard(s, own, err);
     status = status == MHE_OK ? rows_open(s->dir, own, 0, &w, err) : status;
-    for (int32_t i = 0; i < a->n_others && status == MHE_OK; i++) {
-        status = take_rows(s, a->others[i], &w, &n_taken, err);
+    for (int32_t i = 0; i < a->others.n && status == MHE_OK; i++) {
+        status = take_rows(s, a->others.values[i], &w, &n_taken, err);
     }
     mhe_error late = {0};
     mhe_status closed = rows_close(&w, status == MHE_OK ? err : &late);
@@ -181,7 +181,7 @@ static mhe_status take_all(session *s, const arguments *a, mhe_error *err) {
 mhe_status run_merge(const arguments *a, const mhe_host *host, mhe_error *err) {
     session s = {.lock = -1};
     mhe_status status = session_reopen(&s, a->file, host, err);
-    if (status == MHE_OK && a->n_others > 0) {
+    if (status == MHE_OK && a->others.n > 0) {
         status = take_all(&s, a, err);
     }
     int lock = -1;

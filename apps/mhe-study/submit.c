@@ -55,8 +55,8 @@ static mhe_status write_script(session *s, const arguments *a, const char *progr
     mhi_text_add(&job, " run ");
     add_quoted(&job, study_file);
     add_option(&job, "--out", dir);
-    for (int32_t i = 0; i < a->n_set; i++) {
-        add_option(&job, "--set", a->set[i]);
+    for (int32_t i = 0; i < a->set.n; i++) {
+        add_option(&job, "--set", a->set.values[i]);
     }
     mhi_text_add(&job, " --workers %d --quiet --shard \"$SLURM_ARRAY_TASK_ID/%d\"\n", (int)workers,
                  (int)a->n_tasks);
@@ -72,15 +72,15 @@ static mhe_status write_script(session *s, const arguments *a, const char *progr
 static mhe_status call_sbatch(session *s, const arguments *a, const char *dir, const char **job,
                               mhe_error *err) {
     const char *script = mhi_arena_format(&s->arena, "%s/slurm/job.sh", dir);
-    const char **argv = MHI_TAKE(&s->arena, const char *, a->n_option + 5);
+    const char **argv = MHI_TAKE(&s->arena, const char *, a->option.n + 5);
     int n = 0;
     if (script == NULL || argv == NULL) {
         return no_memory(err);
     }
     argv[n++] = "sbatch";
     argv[n++] = "--parsable";
-    for (int32_t i = 0; i < a->n_option; i++) {
-        argv[n++] = a->option[i];
+    for (int32_t i = 0; i < a->option.n; i++) {
+        argv[n++] = a->option.values[i];
     }
     argv[n++] = script;
     const char *text = NULL;
@@ -124,7 +124,8 @@ mhe_status submit_study(const arguments *a, const mhe_host *host, mhe_error *err
     session s = {.lock = -1};
     const char *program = NULL, *study_file = NULL, *dir = NULL, *job = NULL;
     mhe_status status = choose_engine(a, err);
-    status = status == MHE_OK ? session_read(&s, a->file, a->set, a->n_set, host, err) : status;
+    status =
+        status == MHE_OK ? session_read(&s, a->file, a->set.values, a->set.n, host, err) : status;
     status = status == MHE_OK ? session_prepare(&s, a->out, a->quiet, err) : status;
     status = status == MHE_OK ? find_paths(&s, a, &program, &study_file, &dir, err) : status;
     status = status == MHE_OK ? write_script(&s, a, program, dir, study_file, err) : status;
