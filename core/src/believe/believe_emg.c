@@ -172,7 +172,7 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
     if (r->emg == NULL) {
         if (wants_emg(run)) {
             mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
-                             "name the EMG in data.emg, or take mhe.cost.min-excitation",
+                             "name the EMG in data.emg, or take a cost that needs none",
                              "%s: a cost tracks EMG, but data.emg is not given: forces are the "
                              "smallest that the motion needs",
                              run->path);
