@@ -255,7 +255,7 @@ void rk_states_keep(const struct rk_context *c) {
 /* ---- derivatives of a step, for all columns of `sens` at once ---- */
 
 /* What the columns do to the right-hand sides of stage j with K and Z held: R [n_q x columns] of f,
- * S [n_z x columns] of h. */
+ * S [n_z x columns] of h. In the first step of an interval q and v are the first columns. */
 CLONES static void rk_state_direct(struct rk_context *c, double h, int32_t j, double *R,
                                    double *S) {
     const mhe_system *system = c->rk->system;
@@ -272,7 +272,10 @@ CLONES static void rk_state_direct(struct rk_context *c, double h, int32_t j, do
         const double *by_v = (i < n_q ? at->f_v : at->h_v) + k * n_q;
         double *row = i < n_q ? R + i * n : S + (i - n_q) * n;
         for (int32_t m = 0; m < n_q; m++) {
-            if (by_q[m] != 0 || by_v[m] != 0) { /* muscles cross few joints */
+            if (c->step == 0) {
+                row[m] = by_q[m];
+                row[n_q + m] = ch * by_q[m] + by_v[m];
+            } else if (by_q[m] != 0 || by_v[m] != 0) { /* muscles cross few joints */
                 rk_add(row, by_q[m], q + m * n, n);
                 rk_add(row, ch * by_q[m] + by_v[m], v + m * n, n);
             }

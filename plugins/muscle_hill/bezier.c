@@ -2,6 +2,7 @@
 #include "bezier.h"
 
 #include <math.h>
+#include <stddef.h>
 
 /* Slopes nearer than this count as equal: their tangents have no intersection to speak of. */
 #define HILL_PARALLEL 1.5e-8
@@ -30,25 +31,29 @@ static inline void hill_series(const double *c, double u, double out[3]) {
     out[2] = 2 * dd;
 }
 
-/* u with x(u) = x; x(u) increases. Newton, kept between the last values on either side. */
-static double hill_corner_u(const struct hill_corner *corner, double x, double guess) {
+/* u with c(u) = x, c an increasing power series. Newton, kept between the last values on either
+ * side. */
+static double hill_series_root(const double *c, double x, double guess) {
     double lower = 0, upper = 1, u = guess;
     for (int i = 0; i < HILL_NEWTON; i++) {
-        double at[3];
-        hill_series(corner->x, u, at);
-        double off = at[0] - x;
+        double f = c[5], slope = 0;
+        for (int k = 4; k >= 0; k--) {
+            slope = slope * u + f;
+            f = f * u + c[k];
+        }
+        double off = f - x;
         if (off > 0) {
             upper = u;
         } else {
             lower = u;
         }
-        double next = u - off / at[1];
+        double next = u - off / slope;
         if (!(next >= lower && next <= upper)) {
             next = 0.5 * (lower + upper);
         }
         double change = fabs(next - u);
         u = next;
-        if (change < 1e-9) { /* what is left is of the order of its square */
+        if (change < 1e-8) { /* what is left is of the order of its square */
             break;
         }
     }
@@ -66,13 +71,14 @@ static void hill_corner_make(const struct hill_joint *a, const struct hill_joint
     y = b->y + (x - b->x) * b->slope;
     out->x0 = a->x;
     out->x1 = b->x;
+    out->y1 = b->y;
     hill_power(a->x, a->x + c * (x - a->x), b->x + c * (x - b->x), b->x, out->x);
     hill_power(a->y, a->y + c * (y - a->y), b->y + c * (y - b->y), b->y, out->y);
     out->u[0] = 0;
     for (int k = 1; k <= HILL_CELLS; k++) {
         double t = (double)k / HILL_CELLS;
         out->u[k] =
-            k < HILL_CELLS ? hill_corner_u(out, a->x + t * (b->x - a->x), out->u[k - 1]) : 1;
+            k < HILL_CELLS ? hill_series_root(out->x, a->x + t * (b->x - a->x), out->u[k - 1]) : 1;
     }
 }
 
@@ -90,6 +96,17 @@ static struct hill_chain_value hill_line(const struct hill_joint *from, double x
     return (struct hill_chain_value){from->y + from->slope * (x - from->x), from->slope, 0};
 }
 
+/* The curve of a corner at u. */
+static struct hill_chain_value hill_corner_at(const struct hill_corner *corner, double u) {
+    double at_x[3], at_y[3];
+    hill_series(corner->x, u, at_x);
+    hill_series(corner->y, u, at_y);
+    double inverse = 1 / at_x[1];
+    return (struct hill_chain_value){at_y[0], at_y[1] * inverse,
+                                     (at_y[2] * at_x[1] - at_y[1] * at_x[2]) * inverse * inverse *
+                                         inverse};
+}
+
 struct hill_chain_value hill_chain_at(const struct hill_chain *chain, double x) {
     if (!(x > chain->first.x)) { /* NaN gives NaN */
         return hill_line(&chain->first, x);
@@ -105,12 +122,39 @@ struct hill_chain_value hill_chain_at(const struct hill_chain *chain, double x) 
     double cell = (x - corner->x0) / (corner->x1 - corner->x0) * HILL_CELLS;
     int k = cell < HILL_CELLS ? (int)cell : HILL_CELLS - 1;
     double u = corner->u[k] + (cell - k) * (corner->u[k + 1] - corner->u[k]);
-    u = hill_corner_u(corner, x, u);
-    double at_x[3], at_y[3];
-    hill_series(corner->x, u, at_x);
-    hill_series(corner->y, u, at_y);
-    double inverse = 1 / at_x[1];
-    return (struct hill_chain_value){at_y[0], at_y[1] * inverse,
-                                     (at_y[2] * at_x[1] - at_y[1] * at_x[2]) * inverse * inverse *
-                                         inverse};
+    return hill_corner_at(corner, hill_series_root(corner->x, x, u));
+}
+
+struct hill_chain_value hill_chain_solve(const struct hill_chain *chain, double gain, double weight,
+                                         double sum, double *x) {
+    const struct hill_joint *first = &chain->first, *last = &chain->last;
+    const struct hill_joint *line = NULL;
+    if (!(sum > gain * first->y + weight * first->x)) { /* NaN gives NaN */
+        line = first;
+    } else if (sum >= gain * last->y + weight * last->x) {
+        line = last;
+    }
+    if (line != NULL) {
+        *x = (sum - gain * (line->y - line->slope * line->x)) / (gain * line->slope + weight);
+        return hill_line(line, *x);
+    }
+    int32_t i = 0;
+    double c[6], from = 0, to = 0;
+    for (;; i++) {
+        const struct hill_corner *corner = &chain->corner[i];
+        to = gain * corner->y1 + weight * corner->x1;
+        if (sum < to || i == chain->n - 1) {
+            break;
+        }
+    }
+    const struct hill_corner *corner = &chain->corner[i];
+    for (int k = 0; k < 6; k++) {
+        c[k] = gain * corner->y[k] + weight * corner->x[k];
+    }
+    from = c[0];
+    double u = hill_series_root(c, sum, to > from ? (sum - from) / (to - from) : 0.5);
+    double at[3];
+    hill_series(corner->x, u, at);
+    *x = at[0];
+    return hill_corner_at(corner, u);
 }

@@ -7,7 +7,7 @@
 #include <stdint.h>
 
 #define HILL_CORNERS 5
-#define HILL_CELLS 16
+#define HILL_CELLS 32
 
 /* Where a corner begins or ends. */
 struct hill_joint {
@@ -16,7 +16,7 @@ struct hill_joint {
 
 /* A segment: x(u), y(u) for u in 0..1 as power series, and u at equal parts of x to start from. */
 struct hill_corner {
-    double x0, x1;
+    double x0, x1, y1;
     double x[6], y[6];
     double u[HILL_CELLS + 1];
 };
@@ -36,5 +36,9 @@ void hill_chain_make(const struct hill_joint *joints, const double *curviness, i
                      struct hill_chain *out);
 
 struct hill_chain_value hill_chain_at(const struct hill_chain *chain, double x);
+
+/* The x, and the curve there, with gain y(x) + weight x = sum; that must increase with x. */
+struct hill_chain_value hill_chain_solve(const struct hill_chain *chain, double gain, double weight,
+                                         double sum, double *x);
 
 #endif

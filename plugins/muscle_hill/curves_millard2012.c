@@ -30,6 +30,13 @@ static struct hill_shape millard_speeds(const struct hill_muscle *muscle, double
     return millard_shape(&muscle->millard->velocity, s);
 }
 
+static struct hill_shape millard_balance(const struct hill_muscle *muscle, double gain, double sum,
+                                         double *s) {
+    struct hill_chain_value fv =
+        hill_chain_solve(&muscle->millard->velocity, gain, muscle->beta, sum, s);
+    return (struct hill_shape){fv.value, fv.slope};
+}
+
 static struct hill_shape millard_tendon(const struct hill_muscle *muscle, double x) {
     return millard_shape(&muscle->millard->tendon, x);
 }
@@ -51,6 +58,7 @@ static void millard_prepare(const mhe_muscle *muscle, const struct hill_config *
     out->passive_scale = 1;
     out->lengths = millard_lengths;
     out->speeds = millard_speeds;
+    out->balance = millard_balance;
     out->tendon = millard_tendon;
     out->tendon_zero = 1;
     hill_elastic_prepare(muscle, out->millard->shortest, out);

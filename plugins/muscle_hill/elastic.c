@@ -65,6 +65,11 @@ static void hill_stop(const struct hill_muscle *m, double z, double r, double *r
 static double hill_root(const struct hill_muscle *m, double a, double x, double pull,
                         struct hill_shape *fv, double *fv_a) {
     double s = 0;
+    if (m->balance != NULL) {
+        *fv_a = 0;
+        *fv = m->balance(m, x, pull, &s);
+        return s;
+    }
     *fv = m->speeds(m, a, s, fv_a);
     if (x == 0) {
         s = pull / m->beta;

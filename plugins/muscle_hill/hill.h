@@ -47,6 +47,9 @@ typedef void (*hill_lengths)(const struct hill_muscle *muscle, double n, struct 
                              struct hill_shape *fp);
 typedef struct hill_shape (*hill_speeds)(const struct hill_muscle *muscle, double a, double s,
                                          double *by_a);
+/* The s with gain fv(s) + beta s = sum; fv there. */
+typedef struct hill_shape (*hill_balance)(const struct hill_muscle *muscle, double gain, double sum,
+                                          double *s);
 typedef struct hill_shape (*hill_tendon)(const struct hill_muscle *muscle, double x);
 
 struct hill_muscle {
@@ -73,6 +76,7 @@ struct hill_muscle {
     /* an elastic tendon, see elastic.h; lengths is NULL where the set has none */
     hill_lengths lengths;
     hill_speeds speeds;
+    hill_balance balance; /* NULL: by iteration on `speeds` */
     hill_tendon tendon;
     int32_t elastic;                              /* whether this muscle's is */
     double l_opt;                                 /* m */
