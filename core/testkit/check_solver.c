@@ -349,4 +349,5 @@ void mhi_check_solver(mhi_kit *kit) {
     }
     check_solves(kit, &s, &c);
     s.ops->destroy(s.self);
+    mhi_check_parameters(kit);
 }

@@ -14,26 +14,36 @@ double nlp_now(void) {
 
 /* Where the parts of a node begin in its piece of the store. */
 typedef struct layout {
-    int32_t cost, x_next, grad_x, grad_u, xx, ux, uu, A, B, end;
+    int32_t cost, x_next, grad_x, grad_u, grad_p, xx, ux, uu, px, pu, pp, A, B, P, end;
 } layout;
 
 static layout node_layout(const mhe_stage_problem *problem) {
-    int32_t n_x = problem->n_x, n_u = problem->n_u;
+    int32_t n_x = problem->n_x, n_u = problem->n_u, n_p = problem->n_p;
     layout at = {.cost = 0, .x_next = 1};
     at.grad_x = at.x_next + n_x;
     at.grad_u = at.grad_x + n_x;
-    at.xx = at.grad_u + n_u;
+    at.grad_p = at.grad_u + n_u;
+    at.xx = at.grad_p + n_p;
     at.ux = at.xx + n_x * n_x;
     at.uu = at.ux + n_u * n_x;
-    at.A = at.uu + n_u * n_u;
+    at.px = at.uu + n_u * n_u;
+    at.pu = at.px + n_p * n_x;
+    at.pp = at.pu + n_p * n_u;
+    at.A = at.pp + n_p * n_p;
     at.B = at.A + n_x * n_x;
-    at.end = at.B + n_x * n_u;
+    at.P = at.B + n_x * n_u;
+    at.end = at.P + n_x * n_p;
     return at;
 }
 
 /* Position in w of x_k; u_k follows it. */
 static int32_t x_at(const nlp *p, int32_t k) {
     return k * (p->problem->n_x + p->problem->n_u);
+}
+
+/* ... and of the parameters. */
+static int32_t p_at(const nlp *p) {
+    return x_at(p, p->problem->n_intervals) + p->problem->n_x;
 }
 
 static int32_t count(const uint8_t *pattern, int32_t n) {
@@ -45,18 +55,19 @@ static int32_t count(const uint8_t *pattern, int32_t n) {
 }
 
 mhe_status nlp_create(nlp *p, const mhe_stage_problem *problem, mhe_error *err) {
-    int32_t N = problem->n_intervals, n_x = problem->n_x, n_u = problem->n_u;
+    int32_t N = problem->n_intervals, n_x = problem->n_x, n_u = problem->n_u, n_p = problem->n_p;
     if ((int64_t)(N + 1) * node_layout(problem).end > INT32_MAX) { /* Ipopt counts with int */
         return mhe_fail(err, MHE_E_ARGUMENT,
                         "%d intervals of %d states and %d controls are more than Ipopt can count",
                         N, n_x, n_u);
     }
-    int32_t n_jacobian =
-        N * (n_x + count(problem->A_pattern, n_x * n_x) + count(problem->B_pattern, n_x * n_u));
+    int32_t n_jacobian = N * (n_x + count(problem->A_pattern, n_x * n_x) +
+                              count(problem->B_pattern, n_x * n_u) + n_x * n_p);
     int32_t n_hessian =
         (N + 1) * count(problem->xx_pattern, n_x * n_x) +
-        N * (count(problem->ux_pattern, n_u * n_x) + count(problem->uu_pattern, n_u * n_u));
-    *p = (nlp){.problem = problem, .n_all = N * (n_x + n_u) + n_x, .m = N * n_x, .n = -1};
+        N * (count(problem->ux_pattern, n_u * n_x) + count(problem->uu_pattern, n_u * n_u)) +
+        (N + 1) * n_p * (n_x + n_u + n_p);
+    *p = (nlp){.problem = problem, .n_all = N * (n_x + n_u) + n_x + n_p, .m = N * n_x, .n = -1};
     size_t n_all = (size_t)p->n_all;
     p->stride = node_layout(problem).end;
     p->of = malloc(n_all * sizeof *p->of);
@@ -67,11 +78,16 @@ mhe_status nlp_create(nlp *p, const mhe_stage_problem *problem, mhe_error *err) 
     p->store = calloc((size_t)(N + 1) * (size_t)p->stride, sizeof *p->store);
     p->jacobian = malloc((size_t)n_jacobian * sizeof *p->jacobian);
     p->hessian = malloc(((size_t)n_hessian + 1) * sizeof *p->hessian);
-    if (p->of == NULL || p->number == NULL || p->w == NULL || p->lower == NULL ||
+    const size_t n_full = (size_t)n_p * (size_t)(n_x + n_u + n_p) + 1;
+    p->full = malloc(n_full);
+    if (p->full != NULL) {
+        memset(p->full, 1, n_full);
+    }
+    if (p->full == NULL || p->of == NULL || p->number == NULL || p->w == NULL || p->lower == NULL ||
         p->upper == NULL || p->store == NULL || p->jacobian == NULL || p->hessian == NULL) {
         nlp_free(p);
         return mhe_fail(err, MHE_E_MEMORY, "no memory for a program of %d variables",
-                        (int)(N * (n_x + n_u) + n_x));
+                        (int)(N * (n_x + n_u) + n_x + n_p));
     }
     return MHE_OK;
 }
@@ -85,10 +101,12 @@ void nlp_free(nlp *p) {
     free(p->store);
     free(p->jacobian);
     free(p->hessian);
+    free(p->full);
     *p = (nlp){0};
 }
 
-void nlp_gather(const nlp *p, const double *x, const double *u, double *w) {
+void nlp_gather(const nlp *p, const double *x, const double *u, const double *parameters,
+                double *w) {
     int32_t n_x = p->problem->n_x, n_u = p->problem->n_u, N = p->problem->n_intervals;
     for (int32_t k = 0; k <= N; k++) {
         memcpy(w + x_at(p, k), x + k * n_x, sizeof(double) * (size_t)n_x);
@@ -96,15 +114,21 @@ void nlp_gather(const nlp *p, const double *x, const double *u, double *w) {
             memcpy(w + x_at(p, k) + n_x, u + k * n_u, sizeof(double) * (size_t)n_u);
         }
     }
+    for (int32_t i = 0; i < p->problem->n_p; i++) {
+        w[p_at(p) + i] = parameters[i];
+    }
 }
 
-void nlp_scatter(const nlp *p, const double *w, double *x, double *u) {
+void nlp_scatter(const nlp *p, const double *w, double *x, double *u, double *parameters) {
     int32_t n_x = p->problem->n_x, n_u = p->problem->n_u, N = p->problem->n_intervals;
     for (int32_t k = 0; k <= N; k++) {
         memcpy(x + k * n_x, w + x_at(p, k), sizeof(double) * (size_t)n_x);
         if (k < N) {
             memcpy(u + k * n_u, w + x_at(p, k) + n_x, sizeof(double) * (size_t)n_u);
         }
+    }
+    for (int32_t i = 0; i < p->problem->n_p; i++) {
+        parameters[i] = w[p_at(p) + i];
     }
 }
 
@@ -126,18 +150,23 @@ static nlp_entry *add_block(const nlp *p, nlp_entry *out, const uint8_t *pattern
 static void number_matrices(nlp *p) {
     const mhe_stage_problem *problem = p->problem;
     int32_t n_x = problem->n_x, n_u = problem->n_u, N = problem->n_intervals;
+    const int32_t n_p = problem->n_p, par = p_at(p);
     layout at = node_layout(problem);
     nlp_entry *J = p->jacobian, *H = p->hessian;
     for (int32_t k = 0; k <= N; k++) {
         int32_t store = k * p->stride, x = x_at(p, k), u = x + n_x;
         H = add_block(p, H, problem->xx_pattern, n_x, n_x, x, x, store + at.xx, 1);
+        H = add_block(p, H, p->full, n_p, n_x, par, x, store + at.px, 1);
+        H = add_block(p, H, p->full, n_p, n_p, par, par, store + at.pp, 1); /* sums over nodes */
         if (k == N) {
             break;
         }
         H = add_block(p, H, problem->ux_pattern, n_u, n_x, u, x, store + at.ux, 1);
         H = add_block(p, H, problem->uu_pattern, n_u, n_u, u, u, store + at.uu, 1);
+        H = add_block(p, H, p->full, n_p, n_u, par, u, store + at.pu, 1);
         J = add_block(p, J, problem->A_pattern, n_x, n_x, k * n_x, x, store + at.A, 0);
         J = add_block(p, J, problem->B_pattern, n_x, n_u, k * n_x, u, store + at.B, 0);
+        J = add_block(p, J, p->full, n_x, n_p, k * n_x, par, store + at.P, 0);
         for (int32_t i = 0; i < n_x; i++) {
             int32_t col = p->number[x_at(p, k + 1) + i];
             if (col >= 0) {
@@ -156,8 +185,13 @@ int32_t nlp_read_bounds(nlp *p) {
     for (int32_t i = 0; i < p->n_all; i++) {
         int32_t k = i / stage, j = i % stage;
         int32_t is_x = j < n_x, at = is_x ? k * n_x + j : k * problem->n_u + j - n_x;
-        double lower = is_x ? problem->x_lower[at] : problem->u_lower[at];
-        double upper = is_x ? problem->x_upper[at] : problem->u_upper[at];
+        const int32_t parameter = i - p_at(p);
+        double lower = parameter >= 0 ? problem->p_lower[parameter]
+                       : is_x         ? problem->x_lower[at]
+                                      : problem->u_lower[at];
+        double upper = parameter >= 0 ? problem->p_upper[parameter]
+                       : is_x         ? problem->x_upper[at]
+                                      : problem->u_upper[at];
         if (!(lower <= upper)) {
             return NLP_EMPTY;
         }
@@ -178,8 +212,8 @@ int32_t nlp_read_bounds(nlp *p) {
     return renumber || changed ? NLP_CHANGED : NLP_SAME;
 }
 
-void nlp_begin(nlp *p, const double *x, const double *u) {
-    nlp_gather(p, x, u, p->w);
+void nlp_begin(nlp *p, const double *x, const double *u, const double *parameters) {
+    nlp_gather(p, x, u, parameters, p->w);
     for (int32_t i = 0; i < p->n_all; i++) {
         p->w[i] = p->number[i] < 0 ? p->lower[i] : p->w[i];
     }
@@ -226,7 +260,14 @@ static mhe_status evaluate_node(nlp *p, int32_t k, int32_t level) {
     if (level == NLP_ALL) {
         out.grad_x = s + at.grad_x;
         out.hess_xx = s + at.xx;
+        if (problem->n_p > 0) {
+            out.grad_p = s + at.grad_p;
+            out.hess_px = s + at.px;
+            out.hess_pp = s + at.pp;
+        }
         if (!is_last) {
+            out.hess_pu = problem->n_p > 0 ? s + at.pu : NULL;
+            out.P = problem->n_p > 0 ? s + at.P : NULL;
             out.grad_u = s + at.grad_u;
             out.hess_ux = s + at.ux;
             out.hess_uu = s + at.uu;
@@ -259,6 +300,9 @@ int32_t nlp_evaluate(nlp *p, const double *v, int32_t level) {
     }
     double start = nlp_now();
     mhe_status status = MHE_OK;
+    if (p->problem->n_p > 0 && p->known == NLP_NOTHING) {
+        status = p->problem->set_parameters(p->problem, p->w + p_at(p), &p->error);
+    }
     for (int32_t k = 0; k <= p->problem->n_intervals && status == MHE_OK; k++) {
         status = evaluate_node(p, k, level);
     }
@@ -296,6 +340,13 @@ void nlp_cost_gradient(const nlp *p, double *grad) {
         memcpy(grad + x_at(p, k), p->store + (ptrdiff_t)k * p->stride + at.grad_x,
                sizeof(double) * (size_t)(k < N ? n_x + n_u : n_x));
     }
+    for (int32_t i = 0; i < p->problem->n_p; i++) {
+        double sum = 0;
+        for (int32_t k = 0; k <= N; k++) {
+            sum += p->store[(ptrdiff_t)k * p->stride + at.grad_p + i];
+        }
+        grad[p_at(p) + i] = sum;
+    }
 }
 
 /* grad -= M^T lambda, M [n_rows x n_cols] */
@@ -317,6 +368,7 @@ void nlp_lagrangian_gradient(const nlp *p, const double *lambda, double *grad) {
         double *by_x = grad + x_at(p, k), *by_next = grad + x_at(p, k + 1);
         subtract_product(store + at.A, multiplier, n_x, n_x, by_x);
         subtract_product(store + at.B, multiplier, n_x, n_u, by_x + n_x);
+        subtract_product(store + at.P, multiplier, n_x, p->problem->n_p, grad + p_at(p));
         for (int32_t i = 0; i < n_x; i++) {
             by_next[i] += multiplier[i];
         }

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* nlp.h: the stage problem as a sparse nonlinear program, whoever solves it.
  *
- * All variables w = (x_0, u_0, x_1, u_1, ..., x_N), stage by stage, so that the matrices are
- * banded. Variables with equal bounds are parameters: the program sees the free ones only, so its
- * structure and bounds stay the same while the first state of a moving horizon is fixed to ever new
- * values. Constraints g_k = x_{k+1} - F_k(x_k, u_k) = 0. */
+ * All variables w = (x_0, u_0, x_1, u_1, ..., x_N, p), stage by stage, so that the matrices are
+ * banded but for the columns of the parameters p. Variables with equal bounds are parameters: the
+ * program sees the free ones only, so its structure and bounds stay the same while the first state
+ * of a moving horizon is fixed to ever new values. Constraints g_k = x_{k+1} - F_k(x_k, u_k) = 0.
+ */
 #ifndef NLP_H
 #define NLP_H
 
@@ -23,6 +24,7 @@ typedef struct nlp {
     int32_t n_all, n, m;           /* variables, free ones, constraints */
     int32_t *of;                   /* [n] position in w of a free variable */
     int32_t *number;               /* [n_all] number of a free variable; -1: fixed */
+    uint8_t *full;                 /* pattern of the blocks of parameters, which have no zeros */
     double *w;                     /* [n_all] the point evaluated last */
     double *lower, *upper;         /* [n_all] */
     double *store;                 /* what evaluate() wrote, node by node */
@@ -50,12 +52,14 @@ void nlp_free(nlp *p);
 int32_t nlp_read_bounds(nlp *p);
 
 /* Between the arrays of a solution and w: x [(N+1) x n_x], u [N x n_u]. */
-void nlp_gather(const nlp *p, const double *x, const double *u, double *w);
-void nlp_scatter(const nlp *p, const double *w, double *x, double *u);
+/* `parameters` [n_p] is not looked at where there are none. */
+void nlp_gather(const nlp *p, const double *x, const double *u, const double *parameters,
+                double *w);
+void nlp_scatter(const nlp *p, const double *w, double *x, double *u, double *parameters);
 
 /* Starts a solve from this iterate, with fixed variables at their bounds; nothing is known any
  * more. */
-void nlp_begin(nlp *p, const double *x, const double *u);
+void nlp_begin(nlp *p, const double *x, const double *u, const double *parameters);
 
 /* Makes `level` known at the point with free variables `v` [n]. 0: the point has no value. */
 int32_t nlp_evaluate(nlp *p, const double *v, int32_t level);

@@ -106,14 +106,14 @@ static int32_t is_finite(const double *values, int32_t n) {
 /* Reads the start into w, v and the multipliers. 1: the multipliers can be used. */
 static int32_t read_start(ipopt_solver *s, const mhe_solution *start) {
     nlp *p = &s->nlp;
-    nlp_begin(p, start->x, start->u);
+    nlp_begin(p, start->x, start->u, start->p);
     pack(p, p->w, s->v);
     if (!start->has_multipliers) {
         return 0;
     }
-    nlp_gather(p, start->zx_lower, start->zu_lower, s->work);
+    nlp_gather(p, start->zx_lower, start->zu_lower, start->zp_lower, s->work);
     pack(p, s->work, s->z_lower);
-    nlp_gather(p, start->zx_upper, start->zu_upper, s->work);
+    nlp_gather(p, start->zx_upper, start->zu_upper, start->zp_upper, s->work);
     pack(p, s->work, s->z_upper);
     memcpy(s->lambda, start->lambda, sizeof(double) * (size_t)p->m);
     return is_finite(s->z_lower, p->n) && is_finite(s->z_upper, p->n) && is_finite(s->lambda, p->m);
@@ -184,7 +184,8 @@ static void write_multipliers(ipopt_solver *s, mhe_solution *out) {
         }
         unpack(p, side == 0 ? s->z_lower : s->z_upper, s->work);
         nlp_scatter(p, s->work, side == 0 ? out->zx_lower : out->zx_upper,
-                    side == 0 ? out->zu_lower : out->zu_upper);
+                    side == 0 ? out->zu_lower : out->zu_upper,
+                    side == 0 ? out->zp_lower : out->zp_upper);
     }
     out->has_multipliers = 1;
 }
@@ -214,7 +215,7 @@ static void write_result(ipopt_solver *s, mhe_solution *out, mhe_solve_info *inf
     int32_t good = is_finite(s->v, p->n) && is_finite(s->lambda, p->m) &&
                    is_finite(s->z_lower, p->n) && is_finite(s->z_upper, p->n);
     if (good && nlp_evaluate(p, s->v, NLP_ALL)) { /* known already unless the solve failed */
-        nlp_scatter(p, p->w, out->x, out->u);
+        nlp_scatter(p, p->w, out->x, out->u, out->p);
         write_multipliers(s, out);
         nlp_constraints(p, s->work);
         info->primal_residual = largest(s->work, p->m);
@@ -273,10 +274,18 @@ static mhe_status ipopt_solve(void *self, const mhe_solve_control *control, mhe_
     return MHE_OK;
 }
 
+/* Any problem: parameters are variables behind the last state. */
+static mhe_status ipopt_accepts(const mhe_stage_problem *problem, const void *config,
+                                mhe_error *err) {
+    (void)problem, (void)config, (void)err;
+    return MHE_OK;
+}
+
 static const mhe_solver_ops ipopt_ops = {.size = sizeof ipopt_ops,
                                          .create = ipopt_create,
                                          .destroy = ipopt_destroy,
-                                         .solve = ipopt_solve};
+                                         .solve = ipopt_solve,
+                                         .accepts = ipopt_accepts};
 
 static const mhe_plugin ipopt_plugin = {
     .size = sizeof ipopt_plugin,

@@ -139,6 +139,34 @@ static void the_table_says_what_is_measured(void **state) {
     rig_close(&r);
 }
 
+/* Every block of states and controls, by its name, also those that have a field of their own. */
+static void blocks_by_name(void **state) {
+    (void)state;
+    rig r;
+    mhe_estimator_info info = {.size = sizeof info};
+    rig_open(&r);
+    for (int32_t k = 0; k <= 2 * N; k++) {
+        (void)push(&r, k, 0, 0);
+    }
+    assert_int_equal(mhe_estimator_describe(r.f.estimator, &info), MHE_OK);
+    assert_ptr_equal(r.e.layout, info.layout);
+    const struct {
+        int32_t role;
+        const char *name;
+        const double *field;
+    } fields[] = {{MHE_ROLE_STATE, "q", r.e.q},
+                  {MHE_ROLE_STATE, "qdot", r.e.qdot},
+                  {MHE_ROLE_STATE, "activation", r.e.activation},
+                  {MHE_ROLE_CONTROL, "excitation", r.e.excitation}};
+    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; i++) {
+        const mhe_block *block = mhe_layout_find(info.layout, fields[i].role, fields[i].name);
+        assert_non_null(block);
+        assert_memory_equal(mhe_estimate_block(&r.e, block), fields[i].field,
+                            sizeof(double) * (size_t)block->count);
+    }
+    rig_close(&r);
+}
+
 /* The same by fields and by channel: the same bits. */
 static void frames_by_channel(void **state) {
     (void)state;
@@ -229,7 +257,7 @@ static void what_is_needed_and_not_there(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(from_empty_to_running), cmocka_unit_test(the_table_says_what_is_measured),
-        cmocka_unit_test(frames_by_channel), cmocka_unit_test(shorter_structs),
-        cmocka_unit_test(what_is_needed_and_not_there)};
+        cmocka_unit_test(blocks_by_name),        cmocka_unit_test(frames_by_channel),
+        cmocka_unit_test(shorter_structs),       cmocka_unit_test(what_is_needed_and_not_there)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

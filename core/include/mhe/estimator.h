@@ -44,6 +44,7 @@
 #define MHE_ESTIMATOR_H
 
 #include <mhe/config.h>
+#include <mhe/layout.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -142,6 +143,7 @@ typedef struct mhe_estimator_info {
     uint32_t channel_size;       /* stride of `channels` */
     const mhe_channel *channels; /* delay and gap follow the interval */
     int32_t phase;               /* MHE_PHASE_*, at the moment */
+    const mhe_layout *layout;    /* of states, controls, inputs, parameters */
 } mhe_estimator_info;
 
 /* Row i of the table. [any] */
@@ -196,7 +198,18 @@ typedef struct mhe_estimate {
     uint32_t tracked_size;      /* stride of `tracked` */
     const mhe_tracked *tracked; /* [n_tracked] what of each channel this node tracked. Of a control
                                  * at the last node, which has none: what the one before it did */
+    const mhe_layout *layout;   /* names and places of what follows: every block of the system */
+    const double *states;       /* [layout->n_x] */
+    const double *controls;     /* [layout->n_u]; at the last node those that lead to it */
 } mhe_estimate;
+
+/* Values of a block of an estimate [block->count]; NULL: it is no state or control. [any] */
+static inline const double *mhe_estimate_block(const mhe_estimate *estimate,
+                                               const mhe_block *block) {
+    return block->role == MHE_ROLE_STATE     ? estimate->states + block->first
+           : block->role == MHE_ROLE_CONTROL ? estimate->controls + block->first
+                                             : NULL;
+}
 
 /* What a channel tracked. [any] */
 static inline const mhe_tracked *mhe_tracked_at(const mhe_estimate *estimate, int32_t i) {

@@ -114,24 +114,31 @@ static void add_left_out(mhi_diagnosis *d, const mhe_estimate *e) {
     }
 }
 
+/* What the estimate's node had of a channel; NULL: there is no such channel. */
+static const double *measured(const mhe_estimator_info *info, const mhe_estimate *e,
+                              const char *channel) {
+    for (int32_t i = 0; i < e->n_tracked; i++) {
+        const mhe_tracked *t = mhe_tracked_at(e, i);
+        if (strcmp(mhe_channel_at(info, t->channel)->name, channel) == 0) {
+            return t->measured;
+        }
+    }
+    return NULL;
+}
+
 void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     const mhe_estimator_info *f = d->info;
-    const mhi_recording *r = d->recording;
-    while (d->frame + 1 < r->n_frames &&
-           fabs(r->time[d->frame + 1] - e->time) <= fabs(r->time[d->frame] - e->time)) {
-        d->frame++;
-    }
-    const ptrdiff_t k = d->frame, late = k - d->run->data.emg_delay;
     d->n++;
     d->n_converged += e->status == MHE_FRAME_OK;
     d->n_predicted += e->status == MHE_FRAME_PREDICTED;
     add_left_out(d, e);
-    add_markers(d, r->markers == NULL ? NULL : r->markers + k * 3 * f->n_markers, e->markers);
+    const double *emg = measured(f, e, "emg");
+    add_markers(d, measured(f, e, "markers"), e->markers);
     const double *control = e->excitation != NULL ? e->excitation : e->activation;
     const double most =
         e->excitation != NULL ? d->run->bounds.excitation_max : d->run->bounds.activation_max;
     for (int32_t i = 0; i < f->n_muscles; i++) {
-        d->emg[i] = r->emg == NULL ? NAN : r->emg[(late < 0 ? 0 : late) * f->n_muscles + i];
+        d->emg[i] = emg == NULL ? NAN : emg[i];
         count(&d->muscles[i], control[i] - d->emg[i]);
         d->at_bound[i] += control[i] >= AT_BOUND * most;
     }

@@ -20,7 +20,6 @@ struct mhi_diagnosis {
     const mhi_run *run;
     const mhi_recording *recording;
     const mhi_system *system;
-    int32_t frame; /* of the recording, of the last estimate */
     int32_t n, n_seen, n_wanted;
     double *distance, *emg;
     mhi_tally *markers, *muscles, *torques, *moments;

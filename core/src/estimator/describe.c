@@ -29,7 +29,8 @@ mhe_status mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *in
                                      .n_channels = e->channels.n,
                                      .channel_size = sizeof(mhe_channel),
                                      .channels = e->channels.faces,
-                                     .phase = e->phase};
+                                     .phase = e->phase,
+                                     .layout = p->layout};
     return mhi_give(__func__, info, &ours, NULL);
 }
 

@@ -125,8 +125,8 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
             mhi_begin_create(&e->begin, e->system, mhi_ocp_context(e->ocp), n + 1, &e->arena, err);
     }
     if (status == MHE_OK) {
-        status =
-            mhi_output_create(&e->output, e->n_q, e->n_m, e->n_k, &e->channels, &e->arena, err);
+        status = mhi_output_create(&e->output, mhi_system_face(e->system), e->n_k, &e->channels,
+                                   &e->arena, err);
     }
     return status;
 }

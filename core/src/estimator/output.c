@@ -3,13 +3,14 @@
 
 #include <string.h>
 
-mhe_status mhi_output_create(mhi_output *o, int32_t n_q, int32_t n_m, int32_t n_k,
+mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_k,
                              const mhi_channels *channels, mhi_arena *arena, mhe_error *err) {
+    const int32_t n_q = system->n_q, n_m = system->n_m;
     struct {
         double **array;
         int32_t n;
-    } wanted[] = {{&o->q, n_q},          {&o->v, n_q},         {&o->activation, n_m},
-                  {&o->excitation, n_m}, {&o->force, n_m},     {&o->moment, n_q},
+    } wanted[] = {{&o->x, system->n_x},  {&o->u, system->n_u},  {&o->q, n_q},     {&o->v, n_q},
+                  {&o->activation, n_m}, {&o->excitation, n_m}, {&o->force, n_m}, {&o->moment, n_q},
                   {&o->residual, n_q},   {&o->marker, 3 * n_k}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
@@ -95,6 +96,8 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
     const double *u = mhi_row(e->window.solution.u, controls, e->n_u);
     const double *a = mhi_system_activation(e->system, x, u);
     const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;
+    memcpy(o->x, x, sizeof(double) * (size_t)e->n_x);
+    memcpy(o->u, u, sizeof(double) * (size_t)e->n_u);
     memcpy(o->q, x, n_q);
     memcpy(o->v, x + e->n_q, n_q);
     memcpy(o->activation, a, n_m);
@@ -139,5 +142,8 @@ mhe_status mhi_output_give(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_e
     out->n_tracked = e->channels.n;
     out->tracked_size = sizeof(mhe_tracked);
     out->tracked = o->tracked;
+    out->layout = mhi_ocp_problem(e->ocp)->layout;
+    out->states = o->x;
+    out->controls = o->u;
     return status;
 }

@@ -58,20 +58,42 @@ static int32_t out_of_time(const mhe_estimator *e) {
     return e->pace.budget > 0 && mhi_now() >= e->pace.arrival + e->pace.budget;
 }
 
-/* Largest change of a velocity or activation of the first state. */
+/* What a number of a block counts as, for the prior: velocities and activations as they are, what
+ * muscles have more by its usual size; 0: positions, which the markers hold. */
+static double prior_unit(const mhe_block *block, int32_t i) {
+    if (strcmp(block->name, "q") == 0) {
+        return 0;
+    }
+    const int32_t more = strcmp(block->name, "qdot") != 0 && strcmp(block->name, "activation") != 0;
+    return more ? 1 / block->scale[i] : 1;
+}
+
+/* Largest change of what the prior holds of the first state. */
 static double first_state_move(const mhe_estimator *e, const double *before) {
+    const mhe_layout *layout = mhi_ocp_problem(e->ocp)->layout;
     double move = 0;
-    for (int32_t i = e->n_q; i < e->n_x; i++) {
-        move = fmax(move, fabs(e->window.solution.x[i] - before[i]));
+    for (int32_t b = 0; b < layout->n_blocks; b++) {
+        const mhe_block *block = mhe_layout_at(layout, b);
+        for (int32_t i = 0; i < block->count && block->role == MHE_ROLE_STATE; i++) {
+            const int32_t at = block->first + i;
+            const double change = fabs(e->window.solution.x[at] - before[at]);
+            move = fmax(move, prior_unit(block, i) * change);
+        }
     }
     return move;
 }
 
 static void set_proximal_weight(mhe_estimator *e, double factor) {
-    for (int32_t i = e->n_q; i < e->n_x; i++) {
-        e->window.prior_weight[i] = factor == 0            ? 0
-                                    : e->begin.rounds == 0 ? FIRST_WEIGHT
-                                                           : factor * e->window.prior_weight[i];
+    const mhe_layout *layout = mhi_ocp_problem(e->ocp)->layout;
+    for (int32_t b = 0; b < layout->n_blocks; b++) {
+        const mhe_block *block = mhe_layout_at(layout, b);
+        for (int32_t i = 0; i < block->count && block->role == MHE_ROLE_STATE; i++) {
+            double *weight = &e->window.prior_weight[block->first + i];
+            const double unit = prior_unit(block, i);
+            *weight = factor == 0            ? 0
+                      : e->begin.rounds == 0 ? FIRST_WEIGHT * unit * unit
+                                             : factor * *weight;
+        }
     }
     mhi_ocp_set_prior(e->ocp, e->window.prior_centre, e->window.prior_weight);
 }
