@@ -166,43 +166,64 @@ static int solve_from(const wrap_surface *surface, const double *p, const double
     return string_shoot(surface, p, s, &start, &turn, out);
 }
 
-int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
-                   wrap_string *out) {
-    fan f;
-    int needs = fan_of(surface, p, s, &f), found = 0, tried = 0;
-    if (needs != WRAP_CROSSED) {
-        return needs;
-    }
-    fan_string fan_strings[FAN];
-    double least = INFINITY, shortest = INFINITY;
-    int allowed[FAN], axis = surface->side_axis, any = 0;
-    for (int k = 0; k < FAN; k++) {
-        fan_string_at(&f, k * (2 * HALF_TURN / FAN), axis, &fan_strings[k]);
-        allowed[k] = axis < 0 || fan_strings[k].apex * surface->side_sign >= 0;
-        any |= allowed[k];
-    }
-    for (int k = 0; k < FAN; k++) {
-        allowed[k] |= !any;
-        if (allowed[k]) {
-            least = fmin(least, fan_strings[k].length);
+/* The angle of the shortest of the fan's strings near the k-th, by a parabola. */
+static double fan_angle(const fan_string *strings, int k) {
+    double before = strings[(k + FAN - 1) % FAN].length, here = strings[k].length;
+    double after = strings[(k + 1) % FAN].length, curve = before - 2 * here + after;
+    double shift = curve > 0 ? 0.5 * (before - after) / curve : 0;
+    return (k + fmax(-0.5, fmin(0.5, shift))) * (2 * HALF_TURN / FAN);
+}
+
+/* The shortest string that is found from the fan's shortest ones, of those allowed. */
+static int shortest_of(const wrap_surface *surface, const double *p, const double *s, const fan *f,
+                       const fan_string *strings, const int *allowed, wrap_string *out) {
+    double shortest = INFINITY, least = INFINITY;
+    int tried[FAN] = {0};
+    for (int round = 0; round < TRIED; round++) {
+        int best = -1;
+        for (int k = 0; k < FAN; k++) {
+            int before = (k + FAN - 1) % FAN, after = (k + 1) % FAN;
+            double length = strings[k].length;
+            int lowest = isinf(shortest) || /* all are tried until one is found */
+                         (!(strings[before].length < length) && !(strings[after].length < length));
+            if (allowed[k] && !tried[k] && lowest && (best < 0 || length < strings[best].length)) {
+                best = k;
+            }
         }
-    }
-    for (int k = 0; k < FAN && tried < TRIED; k++) {
-        int before = (k + FAN - 1) % FAN, after = (k + 1) % FAN;
-        double length = fan_strings[k].length;
-        if (!allowed[k] || length > least * (1 + NEAR) ||
-            (allowed[before] && fan_strings[before].length < length) ||
-            (allowed[after] && fan_strings[after].length <= length)) {
-            continue;
+        if (best < 0 || (isfinite(shortest) && strings[best].length > least * (1 + NEAR))) {
+            break;
         }
         wrap_string string;
-        tried++;
-        if (solve_from(surface, p, s, &f, k * (2 * HALF_TURN / FAN), &string) == 0 &&
+        tried[best] = 1;
+        least = fmin(least, strings[best].length);
+        if (solve_from(surface, p, s, f, fan_angle(strings, best), &string) == 0 &&
             wrap_length(&string) < shortest) {
             shortest = wrap_length(&string);
             *out = string;
-            found = 1;
         }
     }
-    return found ? needs : WRAP_UNSOLVED;
+    return isfinite(shortest);
+}
+
+int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
+                   wrap_string *out) {
+    fan f;
+    fan_string strings[FAN];
+    int needs = fan_of(surface, p, s, &f), axis = surface->side_axis;
+    int allowed[FAN], any = 0;
+    if (needs != WRAP_CROSSED) {
+        return needs;
+    }
+    for (int k = 0; k < FAN; k++) {
+        fan_string_at(&f, k * (2 * HALF_TURN / FAN), axis, &strings[k]);
+        allowed[k] = axis < 0 || strings[k].apex * surface->side_sign >= 0;
+        any |= allowed[k];
+    }
+    if (any && shortest_of(surface, p, s, &f, strings, allowed, out)) {
+        return needs;
+    }
+    for (int k = 0; k < FAN; k++) { /* no string holds on that side */
+        allowed[k] = 1;
+    }
+    return shortest_of(surface, p, s, &f, strings, allowed, out) ? needs : WRAP_UNSOLVED;
 }

@@ -94,24 +94,42 @@ static double meridian_length(const meridian *m, double turn, double *arc) {
     return length + *arc;
 }
 
-/* Where about the axis the shortest of these is, on the side asked for. */
+/* Where about the axis the string touches: it is in the way most where the meridian's string has
+ * the longest arc; about there, where it is shortest. *arc: on the tube. */
 static double contact_guess(const wrap_surface *surface, const meridian *m, double *arc) {
-    double least = INFINITY, best = 0, width = FULL_TURN / AROUND;
-    for (int level = 0; level < 3; level++, width /= 4) {
-        double middle = best;
-        int n = level == 0 ? AROUND : 7;
-        for (int k = 0; k < n; k++) {
-            double at = level == 0 ? k * width : middle + (k - 3) * width, on;
-            double x[2] = {cos(at), sin(at)};
-            if (surface->side_axis >= 0 && surface->side_axis < 2 &&
-                x[surface->side_axis] * surface->side_sign < 0) {
-                continue;
+    double length[AROUND], on[AROUND], width = FULL_TURN / AROUND, best;
+    int deepest = 0, axis = surface->side_axis;
+    for (int k = 0; k < AROUND; k++) {
+        double x[2] = {cos(k * width), sin(k * width)};
+        length[k] = meridian_length(m, k * width, &on[k]);
+        if (axis >= 0 && axis < 2 && x[axis] * surface->side_sign < 0) {
+            on[k] = -INFINITY;
+        }
+        deepest = on[k] > on[deepest] ? k : deepest;
+    }
+    int nearest = deepest;
+    for (int way = -1; way <= 1; way += 2) {
+        for (int k = 1; k < AROUND; k++) {
+            int at = (deepest + way * k + AROUND) % AROUND;
+            if (!(on[at] > 0)) {
+                break;
             }
-            double length = meridian_length(m, at, &on);
-            if (length < least) {
-                least = length;
-                best = at;
-                *arc = on;
+            nearest = length[at] < length[nearest] ? at : nearest;
+        }
+    }
+    best = nearest * width;
+    *arc = on[nearest];
+    double least = *arc > 0 ? length[nearest] : INFINITY, most = *arc;
+    for (int level = 0; level < 2; level++) {
+        width /= 4;
+        double middle = best;
+        for (int k = -3; k <= 3; k++) {
+            double here, value = meridian_length(m, middle + k * width, &here);
+            if (here > 0 ? value < least : isinf(least) && here > most) {
+                least = here > 0 ? value : least;
+                most = here;
+                best = middle + k * width;
+                *arc = here;
             }
         }
     }
