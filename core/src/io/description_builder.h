@@ -37,7 +37,8 @@ typedef struct mhi_point_draft {
 typedef struct mhi_body_draft {
     mhe_body body; /* parent and motions are filled in by the builder */
     const char *parent;
-    mhi_list motions; /* mhe_motion */
+    const char *joint; /* name of the joint that carries it; NULL */
+    mhi_list motions;  /* mhe_motion */
     int32_t line;
     int32_t carried; /* for the reader: the joint has been seen */
 } mhi_body_draft;
@@ -239,6 +240,8 @@ mhe_function mhi_function_scaled(mhi_builder *b, double scale, mhe_function func
 mhe_function mhi_function_natural_spline(mhi_builder *b, const double *x, const double *y,
                                          int32_t n, int32_t half_order);
 double mhi_function_value(const mhe_function *function, double t);
+/* out [3] = f(t), f'(t), f''(t) */
+void mhi_function_derivatives(const mhe_function *function, double t, double out[3]);
 /* 1 where f is the same everywhere. */
 int32_t mhi_function_is_constant(const mhe_function *function);
 

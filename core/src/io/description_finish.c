@@ -61,7 +61,8 @@ static void place_bodies(mhi_builder *b, mhe_description *d, const mhi_places *p
     mhe_body *bodies = mhi_build_take(b, b->bodies.n, sizeof *bodies);
     int32_t *parent = mhi_build_take(b, b->bodies.n, sizeof *parent);
     int32_t *line = mhi_build_take(b, b->bodies.n, sizeof *line);
-    if (bodies == NULL || parent == NULL || line == NULL) {
+    const char **joints = mhi_build_take(b, b->bodies.n, sizeof *joints);
+    if (bodies == NULL || parent == NULL || line == NULL || joints == NULL) {
         return;
     }
     order_bodies(b, places->body, parent);
@@ -69,10 +70,12 @@ static void place_bodies(mhi_builder *b, mhe_description *d, const mhi_places *p
         mhe_body *body = &bodies[places->body[i]];
         *body = BODY(b, i)->body;
         line[places->body[i]] = BODY(b, i)->line;
+        joints[places->body[i]] = BODY(b, i)->joint;
         body->parent = parent[i] == GROUND ? GROUND : places->body[parent[i]];
         place_motions(b, BODY(b, i), places->coordinate, body);
     }
     d->bodies = bodies;
+    d->joints = joints;
     d->n_bodies = b->bodies.n;
     if (b->status == MHE_OK) {
         mhi_build_right_handed(b, bodies, d->n_bodies, line, places->mirrored);

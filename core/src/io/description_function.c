@@ -52,17 +52,27 @@ mhe_function mhi_function_scaled(mhi_builder *b, double scale, mhe_function func
     return f;
 }
 
-double mhi_function_value(const mhe_function *function, double t) {
+void mhi_function_derivatives(const mhe_function *function, double t, double out[3]) {
     int32_t i = 0;
     while (i + 1 < function->n_pieces && t >= function->origin[i + 1]) {
         i++;
     }
     const double *c = &function->coef[i * function->n_coef];
-    double s = t - function->origin[i], value = 0;
+    double s = t - function->origin[i], value = 0, first = 0, half = 0;
     for (int32_t k = function->n_coef - 1; k >= 0; k--) {
+        half = half * s + first;
+        first = first * s + value;
         value = value * s + c[k];
     }
-    return value;
+    out[0] = value;
+    out[1] = first;
+    out[2] = 2 * half;
+}
+
+double mhi_function_value(const mhe_function *function, double t) {
+    double out[3];
+    mhi_function_derivatives(function, t, out);
+    return out[0];
 }
 
 int32_t mhi_function_is_constant(const mhe_function *function) {

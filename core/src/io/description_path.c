@@ -76,7 +76,8 @@ static void check_obstacle(mhi_builder *b, const mhi_obstacle_draft *draft) {
         }
     }
     if (o->kind == MHE_OBSTACLE_TORUS && !(o->size[0] < o->size[1])) {
-        mhi_build_fail(b, draft->line, "torus '%s': its hole (%g) is not smaller than itself (%g)",
+        mhi_build_fail(b, draft->line,
+                       "torus '%s': the radius of its tube (%g) is not below that of its ring (%g)",
                        o->name, o->size[0], o->size[1]);
     }
 }

@@ -119,6 +119,7 @@ static void set_frames(mhi_body_draft *draft, const char *parent, const mhi_tran
 }
 
 static void build_motions(mhi_osim *o, mhi_osim_joint *j) {
+    j->body->joint = j->name;
     for (size_t i = 0; i < sizeof plain_joints / sizeof *plain_joints; i++) {
         if (mhi_xml_is(j->node, plain_joints[i].type)) {
             build_plain(o, j, plain_joints[i].motions);
