@@ -9,7 +9,8 @@
 void angular_map(const oracle *o, const cJSON *pose, double *map, double *rest) {
     const cJSON *q = cJSON_GetObjectItemCaseSensitive(pose, "q");
     const cJSON *rates = cJSON_GetObjectItemCaseSensitive(pose, "qdot");
-    rates = rates != NULL ? rates : cJSON_GetObjectItemCaseSensitive(pose, "u"); /* the same there */
+    rates =
+        rates != NULL ? rates : cJSON_GetObjectItemCaseSensitive(pose, "u"); /* the same there */
     memset(map, 0, sizeof *map * (size_t)(o->n * o->n));
     for (int i = 0; i < o->n; i++) {
         rest[i] = 0;
@@ -23,9 +24,8 @@ void angular_map(const oracle *o, const cJSON *pose, double *map, double *rest) 
         const double da = oracle_value(rates, o->name[t]), db = oracle_value(rates, o->name[t + 1]);
         const double dc = oracle_value(rates, o->name[t + 2]);
         /* columns: the axes of the three turns, and how they turn themselves */
-        const double axes[3][3] = {{1, 0, sin(b)},
-                                   {0, cos(a), -sin(a) * cos(b)},
-                                   {0, sin(a), cos(a) * cos(b)}};
+        const double axes[3][3] = {
+            {1, 0, sin(b)}, {0, cos(a), -sin(a) * cos(b)}, {0, sin(a), cos(a) * cos(b)}};
         const double turn[3][2] = {{0, cos(b) * db},
                                    {-sin(a) * da, -cos(a) * cos(b) * da + sin(a) * sin(b) * db},
                                    {cos(a) * da, -sin(a) * cos(b) * da - cos(a) * sin(b) * db}};

@@ -11,13 +11,13 @@
 typedef struct oracle {
     cJSON *root;
     const cJSON *coordinates, *poses;
-    int n;                    /* coordinates */
+    int n; /* coordinates */
     const char *name[MAX_C];
     int dependent[MAX_C];
-    int triple[MAX_C];        /* first of three angles whose speeds are an angular velocity; -1 */
-    int angular;              /* there are such */
-    int loops;                /* constraints other than couplers are in the file */
-    int turns_together;       /* one coordinate drives several rotation axes of a joint */
+    int triple[MAX_C];  /* first of three angles whose speeds are an angular velocity; -1 */
+    int angular;        /* there are such */
+    int loops;          /* constraints other than couplers are in the file */
+    int turns_together; /* one coordinate drives several rotation axes of a joint */
 } oracle;
 
 /* Reads NAME.oracle.json; 0 where the data is not there. Fails the test where it cannot be read. */

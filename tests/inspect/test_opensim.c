@@ -15,13 +15,14 @@
 
 enum { LENGTH, SPEED, ARM, MASS, TORQUE, BODY, MARKER, Q, N_WORST };
 
-static const char *const what[N_WORST] = {"length", "speed", "moment arm", "mass matrix",
-                                          "inverse dynamics", "bodies", "markers", "coordinates"};
+static const char *const what[N_WORST] = {
+    "length",           "speed",  "moment arm", "mass matrix",
+    "inverse dynamics", "bodies", "markers",    "coordinates"};
 
 typedef struct comparison {
     const oracle *o;
-    const cJSON *pose, *ours; /* of the oracle, of the answer */
-    const cJSON *free;        /* names of the independent coordinates */
+    const cJSON *pose, *ours;     /* of the oracle, of the answer */
+    const cJSON *free;            /* names of the independent coordinates */
     double column[MAX_C * MAX_C]; /* [speeds x free rates]: what moves with each free coordinate */
     int n_free;
     double *worst;
@@ -161,10 +162,11 @@ static void compare_lines(comparison *c) {
 
 /* Which comparisons a model of the data allows. */
 #define WITH_ALL 0
-#define LOOP 1      /* the oracle's `coupling` is closed by a weld too, our tree is open there */
-#define SIMBODY_H 2 /* one coordinate turns a joint about several axes: in Simbody's velocity terms
-                     * of such joints (MobilizedBody::FunctionBased) each axis's rate contains those
-                     * of the others; checked against the mass matrix instead, see test below */
+#define LOOP 1 /* the oracle's `coupling` is closed by a weld too, our tree is open there */
+#define SIMBODY_H                                                                      \
+    2 /* one coordinate turns a joint about several axes: in Simbody's velocity terms  \
+       * of such joints (MobilizedBody::FunctionBased) each axis's rate contains those \
+       * of the others; checked against the mass matrix instead, see test below */
 
 static const struct {
     const char *name;
