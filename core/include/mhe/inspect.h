@@ -40,6 +40,9 @@ MHE_API mhe_status mhe_model_info(const mhe_host *host, const char *file, int32_
  *                                      "passive", "tendon_force"}},    rigid tendons; by activation
  *                 "reactions": {JOINT: {"force", "moment"}}}]}           where forces are given
  *
+ * Muscles have rigid tendons; one that is slack is reported as OpenSim does: its fibre stands at
+ * the shortest, and a tendon never pushes (in a run the curves go on smoothly there).
+ *
  * Inverse dynamics: M udot + bias - external loads, no muscles, by the free coordinates with what
  * follows them. Reactions act on the child at the joint's frame in it, in ground; every load that
  * is given acts. `*text` is the caller's: mhe_free(). MHE_E_INPUT: a file cannot be read, or names

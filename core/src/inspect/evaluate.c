@@ -9,6 +9,7 @@
 
 #include <mhe/inspect.h>
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -151,6 +152,37 @@ static void dynamics(const mhi_inspected *m, const results *r, cJSON *out) {
     }
 }
 
+/* A muscle's row of results. */
+enum { FIBER_LENGTH, FIBER_VELOCITY, PENNATION, ACTIVE, PASSIVE, TENDON_FORCE, N_ROWS };
+
+/* Curves of the muscle plugin go on smoothly where a muscle is slack; what is reported is, as in
+ * OpenSim, a fibre that stands at its shortest and pulls nothing, and a tendon that never pushes:
+ * then the passive part takes up the active one. Shortest: where Millard's active curve begins, or
+ * at the steepest pennation. */
+static void report_slack(const mhe_muscle *m, double *row, int32_t stride) {
+    const double stated = m->millard.min_norm_active_fiber_length;
+    const double steepest = m->maximum_pennation_angle == m->maximum_pennation_angle
+                                ? m->maximum_pennation_angle
+                                : acos(0.1);
+    const double width = m->optimal_fiber_length * sin(m->pennation_angle);
+    const double shortest =
+        fmax(m->optimal_fiber_length * (stated == stated ? stated : 0.4441), width / sin(steepest));
+    if (m->type != MHE_MUSCLE_MILLARD2012) {
+        return;
+    }
+    const double along = row[FIBER_LENGTH * stride] * cos(row[PENNATION * stride]);
+    if (!(along > sqrt(shortest * shortest - width * width))) {
+        for (int k = 0; k < N_ROWS; k++) {
+            row[k * stride] = 0;
+        }
+        row[FIBER_LENGTH * stride] = shortest;
+        row[PENNATION * stride] = asin(width / shortest);
+    } else if (row[TENDON_FORCE * stride] < 0) {
+        row[PASSIVE * stride] = -row[ACTIVE * stride];
+        row[TENDON_FORCE * stride] = 0;
+    }
+}
+
 /* Muscles whose activation is given, at this length and speed. */
 static mhe_status muscles(mhi_inspected *m, const results *r, const mhi_pose *pose, cJSON *out,
                           mhe_error *err) {
@@ -158,7 +190,7 @@ static mhe_status muscles(mhi_inspected *m, const results *r, const mhi_pose *po
     const int32_t n = d->n_muscles, n_s = m->layout.n_states;
     int32_t given = 0;
     double *state = MHI_TAKE(&m->arena, double, n *n_s), *velocity = MHI_TAKE(&m->arena, double, n);
-    double *values = MHI_TAKE(&m->arena, double, 6 * n);
+    double *values = MHI_TAKE(&m->arena, double, N_ROWS *n);
     if (state == NULL || velocity == NULL || values == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
@@ -176,12 +208,12 @@ static mhe_status muscles(mhi_inspected *m, const results *r, const mhi_pose *po
     static const char *const names[] = {"fiber_length", "fiber_velocity", "pennation",
                                         "active",       "passive",        "tendon_force"};
     const mhe_muscle_values wanted = {.size = sizeof wanted,
-                                      .force = values + (ptrdiff_t)5 * n,
-                                      .fiber_length = values,
-                                      .fiber_velocity = values + n,
-                                      .pennation = values + (ptrdiff_t)2 * n,
-                                      .active = values + (ptrdiff_t)3 * n,
-                                      .passive = values + (ptrdiff_t)4 * n};
+                                      .force = values + (ptrdiff_t)TENDON_FORCE * n,
+                                      .fiber_length = values + (ptrdiff_t)FIBER_LENGTH * n,
+                                      .fiber_velocity = values + (ptrdiff_t)FIBER_VELOCITY * n,
+                                      .pennation = values + (ptrdiff_t)PENNATION * n,
+                                      .active = values + (ptrdiff_t)ACTIVE * n,
+                                      .passive = values + (ptrdiff_t)PASSIVE * n};
     mhe_status status = m->muscle->evaluate(m->muscles, &at, &wanted, err);
     cJSON *all = status == MHE_OK ? cJSON_AddObjectToObject(out, "muscles") : NULL;
     for (int32_t i = 0; i < n && status == MHE_OK; i++) {
@@ -189,7 +221,8 @@ static mhe_status muscles(mhi_inspected *m, const results *r, const mhi_pose *po
             continue;
         }
         cJSON *muscle = cJSON_AddObjectToObject(all, d->muscles[i].name);
-        for (int k = 0; k < 6; k++) {
+        report_slack(&d->muscles[i], values + i, n);
+        for (int k = 0; k < N_ROWS; k++) {
             mhi_json_number(muscle, names[k], values[(ptrdiff_t)k * n + i]);
         }
     }
