@@ -285,7 +285,7 @@ AT(mhe_loop, r, 24);
 AT(mhe_loop, p, 168);
 AT(mhe_loop, line, 216);
 
-SIZE(mhe_description, 264);
+SIZE(mhe_description, 288);
 AT(mhe_description, size, 0);
 AT(mhe_description, name, 8);
 AT(mhe_description, source, 16);
@@ -324,6 +324,9 @@ AT(mhe_description, n_unsupported, 232);
 AT(mhe_description, unsupported, 240);
 AT(mhe_description, n_warnings, 248);
 AT(mhe_description, warnings, 256);
+AT(mhe_description, n_dropped, 264);
+AT(mhe_description, dropped, 272);
+AT(mhe_description, joints, 280);
 
 SIZE(mhe_block, 72);
 AT(mhe_block, name, 0);

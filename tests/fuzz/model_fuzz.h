@@ -23,14 +23,69 @@ static void require_body(int32_t body, int32_t n, const double location[3]) {
     require(isfinite(location[0]) && isfinite(location[1]) && isfinite(location[2]));
 }
 
+static void require_function(const mhe_function *f) {
+    require(f->n_pieces >= 1 && f->n_coef >= 1);
+}
+
+/* Every number of a coordinate means one that is there. */
+static void require_coordinate(const mhe_description *d, int32_t coordinate, int32_t least) {
+    require(coordinate >= least && coordinate < d->n_coordinates + d->n_dependents);
+}
+
+static void require_path(const mhe_description *d, const mhe_path *path) {
+    require((path->n_points >= 2) != (path->length != NULL));
+    for (int32_t k = 0; k < path->n_points; k++) {
+        const mhe_path_point *p = &path->points[k];
+        require_body(p->body, d->n_bodies, p->location);
+        for (int i = 0; i < 3; i++) {
+            require_coordinate(d, p->coordinate[i], -1);
+            require(p->kind != MHE_POINT_MOVING || p->coordinate[i] < 0 ||
+                    p->function[i].n_pieces >= 1);
+        }
+        require(p->kind != MHE_POINT_CONDITIONAL || p->lower <= p->upper);
+    }
+    for (int32_t k = 0; k < path->n_wraps; k++) {
+        const mhe_path_wrap *w = &path->wraps[k];
+        require(w->obstacle >= 0 && w->obstacle < d->n_obstacles);
+        require(w->first >= -1 && w->first < path->n_points && w->last < path->n_points);
+    }
+    for (int32_t k = 0; path->length != NULL && k < path->length->n; k++) {
+        require_coordinate(d, path->length->coordinate[k], 0);
+    }
+}
+
+static void require_forces(const mhe_description *d) {
+    require(d->n_paths == d->n_muscles + d->n_path_springs + d->n_ligaments);
+    for (int32_t i = 0; i < d->n_paths; i++) {
+        require_path(d, &d->paths[i]);
+    }
+    for (int32_t i = 0; i < d->n_obstacles; i++) {
+        require(d->obstacles[i].size[0] > 0 && d->obstacles[i].body < d->n_bodies);
+    }
+    for (int32_t i = 0; i < d->n_limits; i++) {
+        require_coordinate(d, d->limits[i].coordinate, 0);
+    }
+    for (int32_t i = 0; i < d->n_coordinate_springs; i++) {
+        require_coordinate(d, d->coordinate_springs[i].coordinate, 0);
+    }
+    for (int32_t i = 0; i < d->n_actuators; i++) {
+        require_coordinate(d, d->actuators[i].coordinate, -1);
+    }
+    for (int32_t i = 0; i < d->n_dependents; i++) {
+        require(d->dependents[i].independent >= 0 &&
+                d->dependents[i].independent < d->n_coordinates + i);
+        require_function(&d->dependents[i].function);
+    }
+}
+
 static void require_sound(const mhe_description *d) {
     for (int32_t i = 0; i < d->n_bodies; i++) {
         const mhe_body *body = &d->bodies[i];
         require(body->parent >= -1 && body->parent < i && body->mass >= 0);
         for (int32_t k = 0; k < body->n_motions; k++) {
             const mhe_motion *m = &body->motions[k];
-            require(m->coordinate >= -1 && m->coordinate < d->n_coordinates);
-            require(m->function.n_pieces >= 1 && m->function.n_coef >= 1);
+            require_coordinate(d, m->coordinate, -1);
+            require_function(&m->function);
             require(fabs(hypot(hypot(m->axis[0], m->axis[1]), m->axis[2]) - 1) < 1e-9);
         }
     }
@@ -41,12 +96,9 @@ static void require_sound(const mhe_description *d) {
         require_body(d->markers[i].body, d->n_bodies, d->markers[i].location);
     }
     for (int32_t i = 0; i < d->n_muscles; i++) {
-        require(d->paths[i].n_points >= 2 && d->muscles[i].max_isometric_force > 0);
-        for (int32_t k = 0; k < d->paths[i].n_points; k++) {
-            const mhe_path_point *point = &d->paths[i].points[k];
-            require_body(point->body, d->n_bodies, point->location);
-        }
+        require(d->muscles[i].max_isometric_force > 0);
     }
+    require_forces(d);
 }
 
 static void model_fuzz(model_parser *parse, const uint8_t *data, size_t size) {

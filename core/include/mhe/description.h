@@ -340,6 +340,11 @@ typedef struct mhe_description {
     const char *const *unsupported;
     int32_t n_warnings; /* what the reader skipped or repaired, one line each with file:line */
     const char *const *warnings;
+    int32_t n_dropped; /* what was left out because it only matters in a forward simulation of its
+                        * own (contact, controllers, probes), one line each with file:line */
+    const char *const *dropped;
+    const char *const *joints; /* [n_bodies] names of the joints that carry the bodies; an entry is
+                                * NULL where a file gives them none; NULL: no names */
 } mhe_description;
 
 #ifdef __cplusplus

@@ -45,6 +45,14 @@ void *mhi_build_push(mhi_builder *b, mhi_list *list, size_t bytes) {
     return item;
 }
 
+void *mhi_build_take(mhi_builder *b, int32_t n, size_t bytes) {
+    void *memory = mhi_arena_take(&b->arena, bytes * (size_t)n);
+    if (memory == NULL && b->status == MHE_OK) {
+        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
+    }
+    return memory;
+}
+
 MHE_PRINTF(4, 0)
 static void place_text(const mhi_builder *b, int32_t line, char out[MHE_ERROR_TEXT],
                        const char *format, va_list args) {
@@ -107,6 +115,15 @@ void mhi_build_unsupported(mhi_builder *b, int32_t line, const char *format, ...
     note(b, &b->unsupported, text);
 }
 
+void mhi_build_dropped(mhi_builder *b, int32_t line, const char *format, ...) {
+    char text[MHE_ERROR_TEXT];
+    va_list args;
+    va_start(args, format);
+    place_text(b, line, text, format, args);
+    va_end(args);
+    note(b, &b->dropped, text);
+}
+
 mhi_body_draft *mhi_build_body(mhi_builder *b, const char *name, const char *parent, int32_t line) {
     mhi_body_draft *draft = mhi_build_push(b, &b->bodies, sizeof *draft);
     if (draft != NULL) {
@@ -133,7 +150,8 @@ static void set_point(mhi_point_draft *point, const char *body, const double loc
                       int32_t line) {
     point->body = body;
     point->line = line;
-    memcpy(point->location, location, sizeof point->location);
+    point->point = (mhe_path_point){.coordinate = {-1, -1, -1}};
+    memcpy(point->point.location, location, sizeof point->point.location);
 }
 
 void mhi_build_marker(mhi_builder *b, const char *name, const char *body, const double location[3],
@@ -148,7 +166,9 @@ void mhi_build_marker(mhi_builder *b, const char *name, const char *body, const 
 mhi_muscle_draft *mhi_build_muscle(mhi_builder *b, const char *name, int32_t line) {
     mhi_muscle_draft *draft = mhi_build_push(b, &b->muscles, sizeof *draft);
     if (draft != NULL) {
-        draft->line = line;
+        draft->line = draft->path.line = line;
+        draft->path.what = "muscle";
+        draft->path.name = name;
         draft->muscle = mhe_muscle_unstated(name);
     }
     return draft;
@@ -156,7 +176,7 @@ mhi_muscle_draft *mhi_build_muscle(mhi_builder *b, const char *name, int32_t lin
 
 void mhi_build_point(mhi_builder *b, mhi_muscle_draft *muscle, const char *body,
                      const double location[3], int32_t line) {
-    mhi_point_draft *point = mhi_build_push(b, &muscle->points, sizeof *point);
+    mhi_point_draft *point = mhi_build_push(b, &muscle->path.points, sizeof *point);
     if (point != NULL) {
         set_point(point, body, location, line);
     }

@@ -24,46 +24,113 @@ typedef struct mhi_list {
     int32_t n, capacity;
 } mhi_list;
 
-/* A place on a body named as in the file. */
+/* Numbers of coordinates in drafts count all coordinates in file order, locked and dependent ones
+ * too; bodies are named as in the file, NULL or "ground": ground. */
+
+/* A place on a body: of a marker, or a point of a path (mhe_path_point without its body). */
 typedef struct mhi_point_draft {
-    const char *body; /* NULL or "ground": ground */
-    double location[3];
+    const char *body;
+    mhe_path_point point;
     int32_t line;
 } mhi_point_draft;
 
 typedef struct mhi_body_draft {
-    mhe_body body;      /* parent and motions are filled in by the builder */
-    const char *parent; /* NULL or "ground": ground */
-    mhi_list motions;   /* mhe_motion; their coordinate counts all coordinates, locked ones too */
+    mhe_body body; /* parent and motions are filled in by the builder */
+    const char *parent;
+    const char *joint; /* name of the joint that carries it; NULL */
+    mhi_list motions;  /* mhe_motion */
     int32_t line;
     int32_t carried; /* for the reader: the joint has been seen */
 } mhi_body_draft;
 
 typedef struct mhi_coordinate_draft {
     mhe_coordinate coordinate;
-    int32_t locked; /* stays at its default value */
+    int32_t locked;        /* stays at its default value */
+    int32_t moves_nothing; /* for the builder: no body, and no other coordinate */
     int32_t line;
 } mhi_coordinate_draft;
+
+/* value of `dependent` = function(value of `independent`) */
+typedef struct mhi_coupler_draft {
+    const char *name;
+    int32_t dependent, independent;
+    mhe_function function;
+    int32_t line;
+} mhi_coupler_draft;
 
 typedef struct mhi_marker_draft {
     const char *name;
     mhi_point_draft point;
 } mhi_marker_draft;
 
+typedef struct mhi_obstacle_draft {
+    mhe_obstacle obstacle;
+    const char *body;
+    int32_t line;
+    int32_t active; /* 0: paths pass through it */
+    int32_t used;   /* by a path that is there */
+} mhi_obstacle_draft;
+
+typedef struct mhi_wrap_draft {
+    const char *obstacle;
+    mhe_path_wrap wrap; /* its obstacle is filled in by the builder */
+    int32_t line;
+} mhi_wrap_draft;
+
+typedef struct mhi_path_draft {
+    const char *what;       /* "muscle", "ligament", "spring": for messages */
+    mhi_list points;        /* mhi_point_draft, in path order */
+    mhi_list wraps;         /* mhi_wrap_draft */
+    mhe_polynomial *length; /* instead of points */
+    const char *name;
+    int32_t line;
+} mhi_path_draft;
+
 typedef struct mhi_muscle_draft {
     mhe_muscle muscle;
-    mhi_list points; /* mhi_point_draft, in path order */
+    mhi_path_draft path;
     int32_t line;
 } mhi_muscle_draft;
+
+/* Forces: their paths come after the muscles', in the order of springs, then ligaments. */
+typedef struct mhi_path_spring_draft {
+    mhe_path_spring spring;
+    mhi_path_draft path;
+} mhi_path_spring_draft;
+
+typedef struct mhi_ligament_draft {
+    mhe_ligament ligament;
+    mhi_path_draft path;
+} mhi_ligament_draft;
+
+typedef struct mhi_bushing_draft {
+    mhe_bushing bushing;
+    const char *body[2];
+    int32_t line;
+} mhi_bushing_draft;
+
+typedef struct mhi_actuator_draft {
+    mhe_actuator actuator;
+    const char *body[2];
+    int32_t line;
+} mhi_actuator_draft;
+
+typedef struct mhi_loop_draft {
+    mhe_loop loop;
+    const char *body[2];
+} mhi_loop_draft;
 
 typedef struct mhi_builder {
     mhi_arena arena;
     const char *source; /* name of the file, for messages */
     const char *name;   /* of the model; NULL: the file's base name */
     double gravity[3];
-    mhi_list bodies, coordinates, markers, muscles; /* the drafts above, in file order */
-    mhi_list unsupported, warnings;                 /* char */
-    mhi_kinds kinds;                                /* of the warnings */
+    mhi_list bodies, coordinates, couplers, markers, muscles; /* the drafts above, in file order */
+    mhi_list obstacles, path_springs, ligaments, bushings, actuators, loops;
+    mhi_list limits, coordinate_springs;     /* of the description; coordinates of drafts */
+    mhi_list unsupported, warnings, dropped; /* char */
+    mhi_kinds kinds;                         /* of the warnings */
+    int32_t unlocked;                        /* locked coordinates are to stay free */
     mhe_status status;
     mhe_error *err;
 } mhi_builder;
@@ -79,6 +146,7 @@ mhe_status mhi_build_abandon(mhi_builder *b);
 MHE_PRINTF(3, 4) void mhi_build_fail(mhi_builder *b, int32_t line, const char *format, ...);
 MHE_PRINTF(3, 4) void mhi_build_warn(mhi_builder *b, int32_t line, const char *format, ...);
 MHE_PRINTF(3, 4) void mhi_build_unsupported(mhi_builder *b, int32_t line, const char *format, ...);
+MHE_PRINTF(3, 4) void mhi_build_dropped(mhi_builder *b, int32_t line, const char *format, ...);
 
 /* Part of mhi_build_finish: the number of warnings that were only counted. */
 void mhi_build_count_kinds(mhi_builder *b);
@@ -98,7 +166,36 @@ void mhi_build_point(mhi_builder *b, mhi_muscle_draft *muscle, const char *body,
 void mhi_build_motion(mhi_builder *b, mhi_body_draft *body, int32_t kind, int32_t coordinate,
                       const double axis[3], mhe_function function, int32_t line);
 
-/* Parts of mhi_build_finish (description_frames.c). Refuses a frame that is no rotation, within the
+/* Parts of mhi_build_finish. */
+
+/* description_check.c: what no mechanics could use is refused. */
+void mhi_build_check(mhi_builder *b);
+/* Index of the draft of the body `name`, -1: ground; -2 after an error that says `what` `whose`
+ * wanted it. */
+int32_t mhi_build_find_body(mhi_builder *b, const char *name, int32_t line, const char *what,
+                            const char *whose);
+
+/* description_coordinates.c: the coordinates of the description: free ones, locked ones among them,
+ * then dependents behind what they depend on; number [drafts] gets their place there, -1: a
+ * coordinate that moves nothing. */
+void mhi_build_coordinates(mhi_builder *b, mhe_description *d, int32_t *number);
+
+/* Where drafts have gone: bodies, coordinates; mirrored [of the description's bodies]. */
+typedef struct mhi_places {
+    int32_t *body, *mirrored, *coordinate;
+} mhi_places;
+
+/* description_path.c, description_force.c: everything that is fixed to bodies. */
+void mhi_build_markers(mhi_builder *b, mhe_description *d, const mhi_places *places);
+void mhi_build_paths(mhi_builder *b, mhe_description *d, const mhi_places *places);
+void mhi_build_forces(mhi_builder *b, mhe_description *d, const mhi_places *places);
+/* Place of a body by its name; `what` and `whose` for the message. */
+int32_t mhi_build_place(mhi_builder *b, const mhi_places *places, const char *body, int32_t line,
+                        const char *what, const char *whose);
+/* n times `bytes` of zeroed memory; NULL with the status set when memory is out. */
+void *mhi_build_take(mhi_builder *b, int32_t n, size_t bytes);
+
+/* description_frames.c. Refuses a frame that is no rotation, within the
  * rounding of model files. */
 void mhi_build_check_rotation(mhi_builder *b, const mhi_body_draft *draft, const double r[9]);
 /* Turns the left-handed frames that some converters write (a pair of them cancels) into
@@ -133,7 +230,19 @@ mhe_function mhi_function_broken_line(mhi_builder *b, const double *x, const dou
  * cubics through the four outermost points (Forsythe, Malcolm & Moler, Computer Methods for
  * Mathematical Computations, 1977, ch. 4); linear beyond the ends. */
 mhe_function mhi_function_spline(mhi_builder *b, const double *x, const double *y, int32_t n);
+/* y0 up to t0, y1 from t1 on, between them a quintic with level ends. */
+mhe_function mhi_function_step(mhi_builder *b, double t0, double t1, double y0, double y1);
 mhe_function mhi_function_scaled(mhi_builder *b, double scale, mhe_function function);
+/* The natural spline of degree 2 half_order - 1 through n >= 2 half_order points: its derivatives
+ * half_order .. 2 half_order - 2 are 0 at both ends; beyond them it goes on as a polynomial of
+ * degree half_order - 1 (Woltring, Adv. Eng. Software 8, 1986, with no smoothing). half_order
+ * 1 .. 4. */
+mhe_function mhi_function_natural_spline(mhi_builder *b, const double *x, const double *y,
+                                         int32_t n, int32_t half_order);
 double mhi_function_value(const mhe_function *function, double t);
+/* out [3] = f(t), f'(t), f''(t) */
+void mhi_function_derivatives(const mhe_function *function, double t, double out[3]);
+/* 1 where f is the same everywhere. */
+int32_t mhi_function_is_constant(const mhe_function *function);
 
 #endif

@@ -1,21 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* description_check.c: from drafts to a description: names are looked up, bodies put behind their
- * parents, locked coordinates made constants, and what no mechanics could use is refused. */
+/* description_check.c: what no mechanics could use is refused: names given twice, unknown bodies,
+ * masses, ranges and muscles that cannot be. */
 #include "base/text.h"
 #include "io/description_builder.h"
-#include "io/model_file.h"
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-
-void mhi_description_free(mhe_description *description) {
-    if (description != NULL) {
-        mhi_owned_description *owned = (mhi_owned_description *)(void *)description;
-        mhi_arena_free(&owned->arena);
-        free(owned);
-    }
-}
 
 #define BODY(b, i) ((mhi_body_draft *)(b)->bodies.items[i])
 #define COORDINATE(b, i) ((mhi_coordinate_draft *)(b)->coordinates.items[i])
@@ -23,9 +13,8 @@ void mhi_description_free(mhe_description *description) {
 #define MUSCLE(b, i) ((mhi_muscle_draft *)(b)->muscles.items[i])
 #define GROUND (-1)
 
-/* Index of the draft of the body `name`; -2 after an error that says `what` wanted it. */
-static int32_t find_body(mhi_builder *b, const char *name, int32_t line, const char *what,
-                         const char *whose) {
+int32_t mhi_build_find_body(mhi_builder *b, const char *name, int32_t line, const char *what,
+                            const char *whose) {
     if (name == NULL) {
         return GROUND;
     }
@@ -141,9 +130,13 @@ static void check_inertia(mhi_builder *b, mhi_body_draft *draft) {
         fmin(fmin(m[0] * m[4] - m[1] * m[1], m[0] * m[8] - m[2] * m[2]), m[4] * m[8] - m[5] * m[5]);
     double det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
                  m[2] * (m[3] * m[7] - m[4] * m[6]);
-    if (fmin(fmin(m[0], m[4]), m[8]) < 0 || minor < -slack * scale ||
-        det < -slack * scale * scale) {
+    if (fmin(fmin(m[0], m[4]), m[8]) < 0) {
         mhi_build_fail(b, draft->line, "the inertia of body '%s' is not positive", body->name);
+    } else if (minor < -slack * scale || det < -slack * scale * scale) {
+        mhi_build_warn(b, draft->line,
+                       "the inertia of body '%s' is not positive about every axis: kept, as "
+                       "OpenSim does",
+                       body->name);
     } else if (m[0] + m[4] < m[8] - slack || m[4] + m[8] < m[0] - slack ||
                m[8] + m[0] < m[4] - slack) {
         mhi_build_warn(b, draft->line,
@@ -178,13 +171,9 @@ static void check_muscle(mhi_builder *b, const mhi_muscle_draft *draft) {
             }
         }
     }
-    if (draft->points.n < 2) {
-        mhi_build_fail(b, draft->line, "muscle '%s' has %d path points; it needs at least 2",
-                       m->name, (int)draft->points.n);
-    }
 }
 
-static void check_all(mhi_builder *b) {
+void mhi_build_check(mhi_builder *b) {
     check_unique(b, "body", b->bodies.n, body_name);
     check_unique(b, "coordinate", b->coordinates.n, coordinate_name);
     drop_double_markers(b);
@@ -205,215 +194,4 @@ static void check_all(mhi_builder *b) {
     for (int32_t i = 0; i < b->muscles.n; i++) {
         check_muscle(b, MUSCLE(b, i));
     }
-}
-
-/* Fills place [n bodies] with each draft's position in a list with parents first, file order
- * otherwise. */
-static void order_bodies(mhi_builder *b, int32_t *place, int32_t *parent) {
-    int32_t n = b->bodies.n, placed = 0, progress = 1;
-    for (int32_t i = 0; i < n; i++) {
-        mhi_body_draft *draft = BODY(b, i);
-        parent[i] = find_body(b, draft->parent, draft->line, "body", draft->body.name);
-        place[i] = -1;
-    }
-    while (placed < n && progress && b->status == MHE_OK) {
-        progress = 0;
-        for (int32_t i = 0; i < n; i++) {
-            if (place[i] < 0 && (parent[i] == GROUND || place[parent[i]] >= 0)) {
-                place[i] = placed++;
-                progress = 1;
-            }
-        }
-    }
-    for (int32_t i = 0; i < n && placed < n; i++) {
-        if (place[i] < 0) {
-            mhi_build_fail(b, BODY(b, i)->line, "body '%s' is its own ancestor",
-                           BODY(b, i)->body.name);
-        }
-    }
-}
-
-/* Moves coordinates that are free and used to the description; `number` [n drafts] gets their
- * index there or -1. */
-static void number_coordinates(mhi_builder *b, mhe_description *d, int32_t *number) {
-    mhe_coordinate *out = MHI_TAKE(&b->arena, mhe_coordinate, b->coordinates.n);
-    int32_t *used = MHI_TAKE(&b->arena, int32_t, b->coordinates.n);
-    if (out == NULL || used == NULL) {
-        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
-        return;
-    }
-    for (int32_t i = 0; i < b->bodies.n; i++) {
-        for (int32_t k = 0; k < BODY(b, i)->motions.n; k++) {
-            const mhe_motion *motion = BODY(b, i)->motions.items[k];
-            if (motion->coordinate >= 0) {
-                used[motion->coordinate] = 1;
-            }
-        }
-    }
-    for (int32_t i = 0; i < b->coordinates.n; i++) {
-        const mhi_coordinate_draft *draft = COORDINATE(b, i);
-        number[i] = -1;
-        if (draft->locked) {
-            continue;
-        }
-        if (!used[i]) {
-            mhi_build_warn(b, draft->line, "coordinate '%s' moves nothing: left out",
-                           draft->coordinate.name);
-            continue;
-        }
-        number[i] = d->n_coordinates;
-        out[d->n_coordinates++] = draft->coordinate;
-    }
-    d->coordinates = out;
-}
-
-/* A locked coordinate's motion becomes the constant it stands at. */
-static void place_motions(mhi_builder *b, const mhi_body_draft *draft, const int32_t *number,
-                          mhe_body *body) {
-    mhe_motion *motions = MHI_TAKE(&b->arena, mhe_motion, draft->motions.n);
-    if (motions == NULL) {
-        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
-        return;
-    }
-    for (int32_t k = 0; k < draft->motions.n; k++) {
-        motions[k] = *(const mhe_motion *)draft->motions.items[k];
-        int32_t coordinate = motions[k].coordinate;
-        if (coordinate < 0) {
-            continue;
-        }
-        motions[k].coordinate = number[coordinate];
-        if (number[coordinate] < 0) {
-            double value = COORDINATE(b, coordinate)->coordinate.value;
-            motions[k].function =
-                mhi_function_constant(b, mhi_function_value(&motions[k].function, value));
-        }
-    }
-    body->motions = motions;
-    body->n_motions = draft->motions.n;
-}
-
-static void place_bodies(mhi_builder *b, mhe_description *d, int32_t *place, int32_t *mirrored) {
-    mhe_body *bodies = MHI_TAKE(&b->arena, mhe_body, b->bodies.n);
-    int32_t *parent = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
-    int32_t *number = MHI_TAKE(&b->arena, int32_t, b->coordinates.n);
-    int32_t *line = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
-    if (bodies == NULL || parent == NULL || number == NULL || line == NULL) {
-        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
-        return;
-    }
-    order_bodies(b, place, parent);
-    number_coordinates(b, d, number);
-    for (int32_t i = 0; i < b->bodies.n && b->status == MHE_OK; i++) {
-        mhe_body *body = &bodies[place[i]];
-        *body = BODY(b, i)->body;
-        line[place[i]] = BODY(b, i)->line;
-        body->parent = parent[i] == GROUND ? GROUND : place[parent[i]];
-        place_motions(b, BODY(b, i), number, body);
-    }
-    d->bodies = bodies;
-    d->n_bodies = b->bodies.n;
-    if (b->status == MHE_OK) {
-        mhi_build_right_handed(b, bodies, d->n_bodies, line, mirrored);
-    }
-}
-
-/* Body and location of a point as the description gives them. */
-static mhe_path_point place_point(mhi_builder *b, const int32_t *place, const int32_t *mirrored,
-                                  const mhi_point_draft *point, const char *what,
-                                  const char *whose) {
-    int32_t i = find_body(b, point->body, point->line, what, whose);
-    mhe_path_point out = {.body = i < 0 ? GROUND : place[i], .coordinate = {-1, -1, -1}};
-    memcpy(out.location, point->location, sizeof out.location);
-    if (out.body >= 0 && mirrored[out.body]) {
-        out.location[2] = -out.location[2];
-    }
-    return out;
-}
-
-static void place_points(mhi_builder *b, mhe_description *d, const int32_t *place,
-                         const int32_t *mirrored) {
-    mhe_marker *markers = MHI_TAKE(&b->arena, mhe_marker, b->markers.n);
-    mhe_muscle *muscles = MHI_TAKE(&b->arena, mhe_muscle, b->muscles.n);
-    mhe_path *paths = MHI_TAKE(&b->arena, mhe_path, b->muscles.n);
-    for (int32_t i = 0; markers != NULL && i < b->markers.n; i++) {
-        const mhi_marker_draft *draft = MARKER(b, i);
-        markers[i].name = draft->name;
-        mhe_path_point point =
-            place_point(b, place, mirrored, &draft->point, "marker", draft->name);
-        markers[i].body = point.body;
-        memcpy(markers[i].location, point.location, sizeof markers[i].location);
-    }
-    for (int32_t i = 0; muscles != NULL && paths != NULL && i < b->muscles.n; i++) {
-        const mhi_muscle_draft *draft = MUSCLE(b, i);
-        mhe_path_point *points = MHI_TAKE(&b->arena, mhe_path_point, draft->points.n);
-        for (int32_t k = 0; points != NULL && k < draft->points.n; k++) {
-            points[k] = place_point(b, place, mirrored, draft->points.items[k], "muscle",
-                                    draft->muscle.name);
-        }
-        muscles[i] = draft->muscle;
-        muscles[i].line = draft->line;
-        paths[i] = (mhe_path){.name = draft->muscle.name,
-                              .n_points = points != NULL ? draft->points.n : 0,
-                              .points = points,
-                              .line = draft->line};
-        if (points == NULL && b->status == MHE_OK) {
-            b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    if ((markers == NULL || muscles == NULL || paths == NULL) && b->status == MHE_OK) {
-        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
-    }
-    d->markers = markers;
-    d->n_markers = b->markers.n;
-    d->muscles = muscles;
-    d->n_muscles = b->muscles.n;
-    d->paths = paths;
-    d->n_paths = b->muscles.n;
-}
-
-/* "models/arm.osim" -> "arm" */
-static const char *base_name(mhi_builder *b) {
-    const char *slash = strrchr(b->source, '/');
-    const char *start = slash != NULL ? slash + 1 : b->source;
-    const char *dot = strrchr(start, '.');
-    const char *copy =
-        mhi_arena_text_n(&b->arena, start, dot != NULL ? (size_t)(dot - start) : strlen(start));
-    return copy != NULL ? copy : "";
-}
-
-mhe_status mhi_build_finish(mhi_builder *b, mhe_description **description) {
-    *description = NULL;
-    mhi_owned_description *owned = calloc(1, sizeof *owned);
-    int32_t *place = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
-    int32_t *mirrored = MHI_TAKE(&b->arena, int32_t, b->bodies.n);
-    if (b->status == MHE_OK && (owned == NULL || place == NULL || mirrored == NULL)) {
-        b->status = mhe_fail(b->err, MHE_E_MEMORY, "out of memory");
-    }
-    if (b->status == MHE_OK) {
-        check_all(b);
-    }
-    mhe_description *d = owned != NULL ? &owned->description : NULL;
-    if (b->status == MHE_OK) {
-        place_bodies(b, d, place, mirrored);
-    }
-    if (b->status == MHE_OK) {
-        place_points(b, d, place, mirrored);
-    }
-    mhi_build_count_kinds(b);
-    const char *name = b->name != NULL ? b->name : base_name(b);
-    if (b->status != MHE_OK || b->arena.failed) {
-        free(owned);
-        return mhi_build_abandon(b);
-    }
-    d->size = sizeof *d;
-    d->name = name;
-    d->source = b->source;
-    memcpy(d->gravity, b->gravity, sizeof d->gravity);
-    d->unsupported = (const char *const *)b->unsupported.items;
-    d->n_unsupported = b->unsupported.n;
-    d->warnings = (const char *const *)b->warnings.items;
-    d->n_warnings = b->warnings.n;
-    owned->arena = b->arena;
-    *description = d;
-    return MHE_OK;
 }

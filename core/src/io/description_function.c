@@ -52,17 +52,37 @@ mhe_function mhi_function_scaled(mhi_builder *b, double scale, mhe_function func
     return f;
 }
 
-double mhi_function_value(const mhe_function *function, double t) {
+void mhi_function_derivatives(const mhe_function *function, double t, double out[3]) {
     int32_t i = 0;
     while (i + 1 < function->n_pieces && t >= function->origin[i + 1]) {
         i++;
     }
     const double *c = &function->coef[i * function->n_coef];
-    double s = t - function->origin[i], value = 0;
+    double s = t - function->origin[i], value = 0, first = 0, half = 0;
     for (int32_t k = function->n_coef - 1; k >= 0; k--) {
+        half = half * s + first;
+        first = first * s + value;
         value = value * s + c[k];
     }
-    return value;
+    out[0] = value;
+    out[1] = first;
+    out[2] = 2 * half;
+}
+
+double mhi_function_value(const mhe_function *function, double t) {
+    double out[3];
+    mhi_function_derivatives(function, t, out);
+    return out[0];
+}
+
+int32_t mhi_function_is_constant(const mhe_function *function) {
+    for (int32_t i = 0; i < function->n_pieces * function->n_coef; i++) {
+        double same = i % function->n_coef == 0 ? function->coef[0] : 0;
+        if (function->coef[i] != same) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 /* Slope of segment i. */
@@ -77,6 +97,22 @@ mhe_function mhi_function_broken_line(mhi_builder *b, const double *x, const dou
         origin[i] = x[i];
         coef[2 * i] = y[i];
         coef[2 * i + 1] = chord(x, y, i);
+    }
+    return f;
+}
+
+mhe_function mhi_function_step(mhi_builder *b, double t0, double t1, double y0, double y1) {
+    static const double quintic[] = {10, -15, 6};
+    double *origin, *coef, h = t1 - t0;
+    mhe_function f = pieces(b, 3, 6, &origin, &coef);
+    if (f.n_pieces > 0) {
+        origin[0] = origin[1] = t0;
+        origin[2] = t1;
+        coef[0] = coef[6] = y0;
+        coef[12] = y1;
+        for (int k = 0; k < 3; k++) {
+            coef[6 + 3 + k] = (y1 - y0) * quintic[k] / pow(h, 3 + k);
+        }
     }
     return f;
 }

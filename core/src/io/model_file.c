@@ -61,8 +61,11 @@ static mhe_status put_first(mhe_description *description, const char *name, cons
     return MHE_OK;
 }
 
-mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
-                           mhe_description **description, mhe_error *err) {
+typedef mhe_status parser(const char *name, const char *text, size_t length,
+                          mhe_description **description, mhe_error *err);
+
+static mhe_status parse_with(parser *osim, const char *name, const char *text, size_t length,
+                             mhe_description **description, mhe_error *err) {
     mhi_decoded d;
     *description = NULL;
     mhe_status status = mhi_decode(name, text, length, &d, err);
@@ -74,7 +77,7 @@ mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
         free(d.owned);
         d = (mhi_decoded){.text = text, .length = length};
     }
-    status = (xml ? mhi_osim_parse : mhi_biomod_parse)(name, d.text, d.length, description, err);
+    status = (xml ? osim : mhi_biomod_parse)(name, d.text, d.length, description, err);
     if (status == MHE_OK && d.foreign_line > 0) {
         status = put_first(*description, name, &d, err);
         if (status != MHE_OK) {
@@ -86,7 +89,13 @@ mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
     return status;
 }
 
-mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_error *err) {
+mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
+                           mhe_description **description, mhe_error *err) {
+    return parse_with(mhi_osim_parse, name, text, length, description, err);
+}
+
+static mhe_status read_with(parser *osim, const char *path, mhe_description **description,
+                            mhe_error *err) {
     char *text;
     size_t length;
     *description = NULL;
@@ -94,7 +103,16 @@ mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_e
     if (status != MHE_OK) {
         return status;
     }
-    status = mhi_model_parse(path, text, length, description, err);
+    status = parse_with(osim, path, text, length, description, err);
     free(text);
     return status;
+}
+
+mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_error *err) {
+    return read_with(mhi_osim_parse, path, description, err);
+}
+
+mhe_status mhi_model_read_unlocked(const char *path, mhe_description **description,
+                                   mhe_error *err) {
+    return read_with(mhi_osim_parse_unlocked, path, description, err);
 }

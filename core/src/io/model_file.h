@@ -11,6 +11,11 @@
  * "file:line: what is wrong". [cold] */
 mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_error *err);
 
+/* The same with the coordinates that the file locks free, each with its own place among the others:
+ * for inverse dynamics that sees their accelerations. [cold] */
+mhe_status mhi_model_read_unlocked(const char *path, mhe_description **description,
+                                   mhe_error *err);
+
 /* Makes a finished description's coordinates i with a finite at[i] [n_coordinates] constants at
  * that value, as locked ones of the file are; the rest keep their order. MHE_E_MEMORY. [cold] */
 mhe_status mhi_description_lock(mhe_description *description, const double *at, mhe_error *err);
@@ -21,6 +26,8 @@ mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
 /* Of one format, whose text is UTF-8 without a byte-order mark. */
 mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
                           mhe_description **description, mhe_error *err);
+mhe_status mhi_osim_parse_unlocked(const char *name, const char *text, size_t length,
+                                   mhe_description **description, mhe_error *err);
 mhe_status mhi_biomod_parse(const char *name, const char *text, size_t length,
                             mhe_description **description, mhe_error *err);
 void mhi_description_free(mhe_description *description);

@@ -9,23 +9,12 @@
 
 #include <libxml/parser.h>
 
-static int32_t is_one_of(const xmlNode *node, const char *const *tags, size_t n) {
-    for (size_t i = 0; i < n; i++) {
-        if (mhi_xml_is(node, tags[i])) {
-            return 1;
-        }
-    }
-    return 0;
-}
-
-/* Objects of a set that act on the motion, unless they say that they are switched off. */
-static void list_set(mhi_osim *o, const char *set) {
-    for (xmlNode *n = mhi_xml_objects(o, o->model, set); n != NULL; n = mhi_xml_next(n)) {
-        const char *on = mhi_xml_word(o, n, "isEnforced");
-        on = on != NULL ? on : mhi_xml_word(o, n, "enabled");
-        if (!mhi_xml_flag(o, n, "isDisabled") && (on == NULL || !mhi_same_word(on, "false"))) {
-            mhi_build_unsupported(&o->b, mhi_xml_line(n), "%s '%s'", (const char *)n->name,
-                                  mhi_xml_name(o, n));
+/* What drives a forward simulation, and what is only computed beside it. */
+static void drop_set(mhi_osim *o, const char *set, const char *why) {
+    for (xmlNode *n = mhi_xml_objects(o->model, set); n != NULL; n = mhi_xml_next(n)) {
+        if (mhi_xml_enabled(o, n)) {
+            mhi_build_dropped(&o->b, mhi_xml_line(n), "%s '%s': %s", (const char *)n->name,
+                              mhi_xml_name(o, n), why);
         }
     }
 }
@@ -33,8 +22,8 @@ static void list_set(mhi_osim *o, const char *set) {
 static void list_components(mhi_osim *o, xmlNode *holder) {
     static const char *const harmless[] = {"PhysicalOffsetFrame", "Station", "Marker"};
     for (xmlNode *n = mhi_xml_first(holder); n != NULL; n = mhi_xml_next(n)) {
-        if (!is_one_of(n, harmless, sizeof harmless / sizeof *harmless)) {
-            mhi_build_unsupported(&o->b, mhi_xml_line(n), "component %s '%s'",
+        if (!mhi_xml_one_of(n, harmless, sizeof harmless / sizeof *harmless)) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "component %s '%s': left out",
                                   (const char *)n->name, mhi_xml_name(o, n));
         }
     }
@@ -52,29 +41,22 @@ static void list_unknown(mhi_osim *o) {
         "ModelVisualizer", "show_visualizer",    "FrameSet",      "frames",
         "notes",           "model_version",      "VisibleObject"};
     for (xmlNode *n = mhi_xml_first(o->model); n != NULL; n = mhi_xml_next(n)) {
-        if (!is_one_of(n, known, sizeof known / sizeof *known)) {
-            mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>", (const char *)n->name);
+        if (!mhi_xml_one_of(n, known, sizeof known / sizeof *known)) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>: left out",
+                                  (const char *)n->name);
+        } else if (*mhi_xml_attribute(o, n, "file") != '\0') {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "<%s> kept in another file",
+                                  (const char *)n->name);
         }
     }
 }
 
 static void read_markers(mhi_osim *o) {
-    for (xmlNode *n = mhi_xml_objects(o, o->model, "MarkerSet"); n != NULL; n = mhi_xml_next(n)) {
+    for (xmlNode *n = mhi_xml_objects(o->model, "MarkerSet"); n != NULL; n = mhi_xml_next(n)) {
         const char *body;
         double location[3];
         if (mhi_xml_is(n, "Marker") && mhi_osim_location(o, n, &body, location)) {
             mhi_build_marker(&o->b, mhi_xml_name(o, n), body, location, mhi_xml_line(n));
-        }
-    }
-}
-
-/* A body that no joint carries floats freely in OpenSim. */
-static void check_carried(mhi_osim *o) {
-    for (int32_t i = 0; i < o->b.bodies.n; i++) {
-        const mhi_body_draft *draft = o->b.bodies.items[i];
-        if (!draft->carried) {
-            mhi_build_unsupported(&o->b, draft->line, "body '%s' without a joint (held by ground)",
-                                  draft->body.name);
         }
     }
 }
@@ -85,15 +67,13 @@ static void read_model(mhi_osim *o) {
     (void)mhi_xml_numbers(o, o->model, "gravity", o->b.gravity, 3);
     mhi_osim_frames(o);
     mhi_osim_bodies(o);
-    for (xmlNode *n = mhi_xml_objects(o, o->model, "JointSet"); n != NULL && o->b.status == MHE_OK;
-         n = mhi_xml_next(n)) {
-        mhi_osim_joint(o, n, NULL);
-    }
-    check_carried(o);
+    mhi_osim_joints(o);
+    mhi_osim_constraints(o);
+    mhi_osim_obstacles(o);
     mhi_osim_forces(o);
     read_markers(o);
-    list_set(o, "ConstraintSet");
-    list_set(o, "ControllerSet");
+    drop_set(o, "ControllerSet", "controllers drive a forward simulation only");
+    drop_set(o, "ProbeSet", "probes are computed beside a simulation");
     list_components(o, mhi_xml_child(o->model, "components"));
     list_components(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"));
     list_unknown(o);
@@ -171,12 +151,13 @@ static void read_text(mhi_osim *o, const char *text, int length) {
     xmlFreeParserCtxt(context);
 }
 
-mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
-                          mhe_description **description, mhe_error *err) {
+static mhe_status parse_model(const char *name, const char *text, size_t length, int32_t unlocked,
+                              mhe_description **description, mhe_error *err) {
     mhi_osim o = {0};
     *description = NULL;
     mhi_build_start(&o.b, name, err);
     o.b.gravity[1] = -9.80665;
+    o.b.unlocked = unlocked;
     if (length > INT_MAX) {
         mhi_build_fail(&o.b, 0, "the file is too large");
         return mhi_build_abandon(&o.b);
@@ -190,4 +171,14 @@ mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
     mhi_c_locale_end(saved);
     xmlSetStructuredErrorFunc(handler_data, handler);
     return mhi_build_finish(&o.b, description);
+}
+
+mhe_status mhi_osim_parse(const char *name, const char *text, size_t length,
+                          mhe_description **description, mhe_error *err) {
+    return parse_model(name, text, length, 0, description, err);
+}
+
+mhe_status mhi_osim_parse_unlocked(const char *name, const char *text, size_t length,
+                                   mhe_description **description, mhe_error *err) {
+    return parse_model(name, text, length, 1, description, err);
 }

@@ -3,6 +3,7 @@
 #include "base/text.h"
 #include "io/osim.h"
 
+#include <stdio.h>
 #include <string.h>
 
 /* Frames fixed to frames; a file of nothing else would exhaust the stack. */
@@ -45,13 +46,19 @@ void mhi_osim_frames(mhi_osim *o) {
     collect(o, mhi_xml_child(o->model, "components"), "");
     collect(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"), "/componentset");
     collect(o, mhi_xml_child(mhi_xml_child(o->model, "Ground"), "components"), "/ground");
-    for (xmlNode *n = mhi_xml_objects(o, o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
+    for (xmlNode *n = mhi_xml_objects(o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
         collect(o, mhi_xml_child(n, "components"), member(o, "/bodyset", n));
     }
-    for (xmlNode *n = mhi_xml_objects(o, o->model, "JointSet"); n != NULL; n = mhi_xml_next(n)) {
+    for (xmlNode *n = mhi_xml_objects(o->model, "JointSet"); n != NULL; n = mhi_xml_next(n)) {
         const char *joint = member(o, "/jointset", n);
         collect(o, mhi_xml_child(n, "frames"), joint);
         collect(o, mhi_xml_child(n, "components"), joint);
+    }
+    for (xmlNode *n = mhi_xml_objects(o->model, "ConstraintSet"); n != NULL; n = mhi_xml_next(n)) {
+        collect(o, mhi_xml_child(n, "frames"), member(o, "/constraintset", n));
+    }
+    for (xmlNode *n = mhi_xml_objects(o->model, "ForceSet"); n != NULL; n = mhi_xml_next(n)) {
+        collect(o, mhi_xml_child(n, "frames"), member(o, "/forceset", n));
     }
 }
 
@@ -173,6 +180,41 @@ int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int
     frame->visiting = 0;
     *in_body = mhi_transform_times(&parent, &frame->in_parent);
     return ok;
+}
+
+/* Frame number k (0, 1) of the two. */
+static int32_t one_frame(mhi_osim *o, xmlNode *object, const char *owner, int k, const char *socket,
+                         const char *before, const char **body, mhi_transform *frame) {
+    char name[64];
+    double angles[3] = {0};
+    mhi_transform place, offset = mhi_transform_identity();
+    (void)snprintf(name, sizeof name, "%s%d", socket, k + 1);
+    const char *target = mhi_osim_socket(o, object, name);
+    if (target == NULL) {
+        (void)snprintf(name, sizeof name, "%s%d", before, k + 1);
+        target = mhi_xml_word(o, object, name);
+    }
+    (void)snprintf(name, sizeof name, "location_%s%d", before, k + 1);
+    (void)mhi_xml_numbers(o, object, name, offset.p, 3);
+    (void)snprintf(name, sizeof name, "orientation_%s%d", before, k + 1);
+    (void)mhi_xml_numbers(o, object, name, angles, 3);
+    mhi_rotation_sequence("xyz", angles, offset.r);
+    if (!mhi_osim_resolve(o, target, owner, mhi_xml_line(object), body, &place)) {
+        return 0;
+    }
+    *frame = mhi_transform_times(&place, &offset);
+    return 1;
+}
+
+int32_t mhi_osim_two_frames(mhi_osim *o, xmlNode *object, const char *set, const char *socket,
+                            const char *before, const char *body[2], mhi_transform frame[2]) {
+    const char *owner = member(o, set, object);
+    for (int k = 0; k < 2; k++) {
+        if (!one_frame(o, object, owner, k, socket, before, &body[k], &frame[k])) {
+            return 0;
+        }
+    }
+    return 1;
 }
 
 int32_t mhi_osim_location(mhi_osim *o, xmlNode *object, const char **body, double location[3]) {

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* osim_function.c: OpenSim's functions of one variable as rows of cubic pieces. */
+/* osim_function.c: OpenSim's functions of one variable as rows of polynomial pieces. */
 #include "io/osim.h"
 
 #include <string.h>
@@ -61,6 +61,9 @@ static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const 
     int32_t n_y;
     *x = mhi_xml_all_numbers(o, mhi_xml_property(node, "x"), n);
     *y = mhi_xml_all_numbers(o, mhi_xml_property(node, "y"), &n_y);
+    if (o->b.status != MHE_OK) {
+        return 0;
+    }
     if (*x == NULL || *y == NULL || *n != n_y || *n < 2) {
         mhi_build_fail(&o->b, mhi_xml_line(node),
                        "<%s> of %s needs as many x as y, at least 2 (has %d and %d)",
@@ -74,6 +77,52 @@ static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const 
             return 0;
         }
     }
+    return 1;
+}
+
+/* The smallest number of points that OpenSim's fit of that order takes is 2 half_order; a larger
+ * error variance than 0 would smooth. */
+static int32_t read_gcv(mhi_osim *o, xmlNode *node, const char *whose, mhe_function *function) {
+    const double *x, *y;
+    double half_order = 3, variance = 0;
+    int32_t n;
+    (void)mhi_xml_numbers(o, node, "half_order", &half_order, 1);
+    (void)mhi_xml_numbers(o, node, "error_variance", &variance, 1);
+    if (!read_points(o, node, whose, &x, &y, &n)) {
+        return -1;
+    }
+    if (variance != 0) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node),
+                              "GCVSpline of %s: its error_variance %g would smooth; it is not "
+                              "applied",
+                              whose, variance);
+    }
+    if (!(half_order >= 1 && half_order <= 4) || n < 2 * (int32_t)half_order) {
+        mhi_build_fail(&o->b, mhi_xml_line(node),
+                       "<GCVSpline> of %s: half_order %g needs to be 1 to 4, and at least twice "
+                       "as many points as that (has %d)",
+                       whose, half_order, (int)n);
+        return -1;
+    }
+    *function = mhi_function_natural_spline(&o->b, x, y, n, (int32_t)half_order);
+    return 1;
+}
+
+/* From start_value to end_value by a quintic with flat ends. */
+static int32_t read_step(mhi_osim *o, xmlNode *node, const char *whose, mhe_function *function) {
+    double t0 = 0, t1 = 1, y0 = 0, y1 = 1;
+    (void)mhi_xml_numbers(o, node, "start_time", &t0, 1);
+    (void)mhi_xml_numbers(o, node, "end_time", &t1, 1);
+    (void)mhi_xml_numbers(o, node, "start_value", &y0, 1);
+    (void)mhi_xml_numbers(o, node, "end_value", &y1, 1);
+    if (!(t1 > t0)) {
+        mhi_build_fail(&o->b, mhi_xml_line(node),
+                       "<StepFunction> of %s ends (%g) before it begins "
+                       "(%g)",
+                       whose, t1, t0);
+        return -1;
+    }
+    *function = mhi_function_step(&o->b, t0, t1, y0, y1);
     return 1;
 }
 
@@ -110,7 +159,7 @@ static int32_t read_multiplier(mhi_osim *o, xmlNode *node, const char *whose,
     return found;
 }
 
-int32_t mhi_osim_function(mhi_osim *o, xmlNode *holder, const char *whose, mhe_function *function) {
+static int32_t read_element(mhi_osim *o, xmlNode *node, const char *whose, mhe_function *function) {
     static const struct {
         const char *tag;
         int32_t (*read)(mhi_osim *, xmlNode *, const char *, mhe_function *);
@@ -119,10 +168,11 @@ int32_t mhi_osim_function(mhi_osim *o, xmlNode *holder, const char *whose, mhe_f
                    {"SimmSpline", read_spline},
                    {"NaturalCubicSpline", read_spline},
                    {"natCubicSpline", read_spline},
+                   {"GCVSpline", read_gcv},
+                   {"StepFunction", read_step},
                    {"PiecewiseLinearFunction", read_broken_line},
                    {"PolynomialFunction", read_polynomial},
                    {"MultiplierFunction", read_multiplier}};
-    xmlNode *node = function_element(holder);
     if (node == NULL) {
         return 0;
     }
@@ -132,7 +182,26 @@ int32_t mhi_osim_function(mhi_osim *o, xmlNode *holder, const char *whose, mhe_f
             return o->b.status == MHE_OK ? found : -1;
         }
     }
-    mhi_build_unsupported(&o->b, mhi_xml_line(node), "function <%s> of %s",
-                          (const char *)node->name, whose);
+    mhi_build_unsupported(&o->b, mhi_xml_line(node),
+                          "function <%s> of %s: what it gives stays at 0", (const char *)node->name,
+                          whose);
     return -1;
+}
+
+int32_t mhi_osim_function(mhi_osim *o, xmlNode *holder, const char *whose, mhe_function *function) {
+    return read_element(o, function_element(holder), whose, function);
+}
+
+int32_t mhi_osim_function_of(mhi_osim *o, xmlNode *object, const char *name, const char *whose,
+                             mhe_function *function) {
+    xmlNode *node = mhi_xml_property(object, name);
+    if (node != NULL) {
+        return read_element(o, mhi_xml_first(node), whose, function);
+    }
+    for (node = mhi_xml_first(object); node != NULL; node = mhi_xml_next(node)) {
+        if (strcmp(mhi_xml_name(o, node), name) == 0) {
+            return read_element(o, node, whose, function);
+        }
+    }
+    return 0;
 }

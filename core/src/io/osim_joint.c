@@ -1,16 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* osim_joint.c: bodies, joints and coordinates of a .osim file. */
+/* osim_joint.c: bodies and the joints that carry them. */
 #include "io/osim.h"
 
 #include <string.h>
-
-/* Coordinates of a joint: numbers [first, first + n) of the builder's. */
-typedef struct joint {
-    xmlNode *node;
-    const char *name;
-    mhi_body_draft *body;
-    int32_t first, n;
-} joint;
 
 static void read_inertia(mhi_osim *o, xmlNode *node, double inertia[9]) {
     static const char *const tags[] = {"inertia_xx", "inertia_yy", "inertia_zz",
@@ -30,39 +22,6 @@ static void read_inertia(mhi_osim *o, xmlNode *node, double inertia[9]) {
     inertia[7] = inertia[5];
 }
 
-static void read_coordinate(mhi_osim *o, xmlNode *node) {
-    double range[2];
-    const char *name = mhi_xml_name(o, node);
-    mhi_coordinate_draft *draft = mhi_build_coordinate(&o->b, name, mhi_xml_line(node));
-    if (draft == NULL) {
-        return;
-    }
-    (void)mhi_xml_numbers(o, node, "default_value", &draft->coordinate.value, 1);
-    (void)mhi_xml_numbers(o, node, "default_speed_value", &draft->coordinate.speed, 1);
-    if (mhi_xml_numbers(o, node, "range", range, 2)) {
-        draft->coordinate.lower = range[0];
-        draft->coordinate.upper = range[1];
-    }
-    draft->locked = mhi_xml_flag(o, node, "locked");
-    if (mhi_xml_flag(o, node, "prescribed")) {
-        mhi_build_unsupported(&o->b, draft->line, "prescribed motion of coordinate '%s'", name);
-    }
-}
-
-static void read_coordinates(mhi_osim *o, joint *j) {
-    j->first = o->b.coordinates.n;
-    xmlNode *node = mhi_xml_first(mhi_xml_child(j->node, "coordinates"));
-    if (node == NULL) {
-        node = mhi_xml_objects(o, j->node, "CoordinateSet");
-    }
-    for (; node != NULL; node = mhi_xml_next(node)) {
-        if (mhi_xml_is(node, "Coordinate")) {
-            read_coordinate(o, node);
-        }
-    }
-    j->n = o->b.coordinates.n - j->first;
-}
-
 /* Joints of a fixed kind: motions in order, each "R" or "T", its axis and its coordinate. The
  * translations of a PlanarJoint and FreeJoint are along axes of the parent, so they come first. */
 static const struct {
@@ -76,24 +35,18 @@ static const struct {
                     {"PlanarJoint", "Tx1Ty2Rz0"},
                     {"FreeJoint", "Tx3Ty4Tz5Rx0Ry1Rz2"}};
 
-static void build_plain(mhi_osim *o, joint *j, const char *motions) {
-    int32_t line = mhi_xml_line(j->node), n = (int32_t)strlen(motions) / 3;
-    for (int32_t i = j->n; i < n; i++) { /* OpenSim's own names for those not listed */
-        const char *name = mhi_arena_format(&o->b.arena, "%s_coord_%d", j->name, (int)i);
-        (void)mhi_build_coordinate(&o->b, name != NULL ? name : "", line);
-    }
+static void build_plain(mhi_osim *o, mhi_osim_joint *j, const char *motions) {
+    mhi_osim_coordinates(o, j, (int32_t)strlen(motions) / 3);
     for (const char *m = motions; *m != '\0' && o->b.status == MHE_OK; m += 3) {
-        int32_t at = j->first + (m[2] - '0');
-        mhi_coordinate_draft *draft = o->b.coordinates.items[at];
-        draft->coordinate.rotational = m[0] == 'R';
         const double axis[3] = {m[1] == 'x', m[1] == 'y', m[1] == 'z'};
-        mhi_build_motion(&o->b, j->body, m[0] == 'R' ? MHE_MOTION_ROTATION : MHE_MOTION_TRANSLATION,
-                         at, axis, mhi_function_identity(&o->b), line);
+        mhi_osim_motion(o, j, m[0] == 'R' ? MHE_MOTION_ROTATION : MHE_MOTION_TRANSLATION,
+                        m[2] - '0', axis);
     }
 }
 
 /* The joint's coordinate `name`; -1 after an error. */
-static int32_t joint_coordinate(mhi_osim *o, const joint *j, const char *name, int32_t line) {
+static int32_t joint_coordinate(mhi_osim *o, const mhi_osim_joint *j, const char *name,
+                                int32_t line) {
     for (int32_t i = j->first; i < j->first + j->n; i++) {
         const mhi_coordinate_draft *draft = o->b.coordinates.items[i];
         if (strcmp(draft->coordinate.name, name) == 0) {
@@ -104,7 +57,7 @@ static int32_t joint_coordinate(mhi_osim *o, const joint *j, const char *name, i
     return -1;
 }
 
-static void build_axis(mhi_osim *o, joint *j, xmlNode *node, int32_t kind) {
+static void build_axis(mhi_osim *o, mhi_osim_joint *j, xmlNode *node, int32_t kind) {
     const char *name = mhi_xml_name(o, node);
     const char *coordinates = mhi_xml_text(o, mhi_xml_child(node, "coordinates"));
     int32_t line = mhi_xml_line(node), coordinate = -1;
@@ -137,7 +90,7 @@ static void build_axis(mhi_osim *o, joint *j, xmlNode *node, int32_t kind) {
 }
 
 /* Translations are along axes of the parent's joint frame, so they come before the rotations. */
-static void build_custom(mhi_osim *o, joint *j) {
+static void build_custom(mhi_osim *o, mhi_osim_joint *j) {
     static const char *const order[] = {"translation1", "translation2", "translation3",
                                         "rotation1",    "rotation2",    "rotation3"};
     xmlNode *transform = mhi_xml_child(j->node, "SpatialTransform");
@@ -154,10 +107,9 @@ static void build_custom(mhi_osim *o, joint *j) {
     }
 }
 
-static void set_frames(mhi_osim *o, mhi_body_draft *draft, const char *parent,
-                       const mhi_transform *in_parent, const mhi_transform *in_child) {
+static void set_frames(mhi_body_draft *draft, const char *parent, const mhi_transform *in_parent,
+                       const mhi_transform *in_child) {
     mhi_transform body = mhi_transform_inverse(in_child);
-    (void)o;
     draft->parent = parent;
     draft->carried = 1;
     memcpy(draft->body.joint_r, in_parent->r, sizeof in_parent->r);
@@ -166,8 +118,46 @@ static void set_frames(mhi_osim *o, mhi_body_draft *draft, const char *parent,
     memcpy(draft->body.body_p, body.p, sizeof body.p);
 }
 
+static void build_motions(mhi_osim *o, mhi_osim_joint *j) {
+    j->body->joint = j->name;
+    for (size_t i = 0; i < sizeof plain_joints / sizeof *plain_joints; i++) {
+        if (mhi_xml_is(j->node, plain_joints[i].type)) {
+            build_plain(o, j, plain_joints[i].motions);
+            return;
+        }
+    }
+    if (mhi_xml_is(j->node, "CustomJoint")) {
+        mhi_osim_coordinates(o, j, 0);
+        build_custom(o, j);
+    } else if (mhi_xml_is(j->node, "EllipsoidJoint")) {
+        mhi_osim_ellipsoid_joint(o, j);
+    } else if (mhi_xml_is(j->node, "ScapulothoracicJoint")) {
+        mhi_osim_scapulothoracic_joint(o, j);
+    } else {
+        mhi_osim_coordinates(o, j, 0);
+        mhi_build_unsupported(&o->b, mhi_xml_line(j->node), "%s '%s': it is held rigid",
+                              (const char *)j->node->name, j->name);
+    }
+}
+
+/* The joint seen from its child, which then carries its parent: the inverse motions in the opposite
+ * order. */
+static void reverse_motions(mhi_osim *o, mhi_body_draft *body) {
+    mhi_list *motions = &body->motions;
+    for (int32_t i = 0, k = motions->n - 1; i < k; i++, k--) {
+        void *swap = motions->items[i];
+        motions->items[i] = motions->items[k];
+        motions->items[k] = swap;
+    }
+    for (int32_t i = 0; i < motions->n; i++) {
+        mhe_motion *motion = motions->items[i];
+        motion->function = mhi_function_scaled(&o->b, -1, motion->function);
+    }
+}
+
 /* Before 4.0 the joint sits in its child body. */
-static void frames_before_4(mhi_osim *o, xmlNode *node, mhi_body_draft *body) {
+static void joint_before_4(mhi_osim *o, xmlNode *node, mhi_body_draft *body) {
+    mhi_osim_joint j = {.node = node, .name = mhi_xml_name(o, node), .body = body};
     mhi_transform in_parent = mhi_transform_identity(), in_child = in_parent;
     double parent_angles[3] = {0}, child_angles[3] = {0};
     (void)mhi_xml_numbers(o, node, "location_in_parent", in_parent.p, 3);
@@ -176,70 +166,107 @@ static void frames_before_4(mhi_osim *o, xmlNode *node, mhi_body_draft *body) {
     (void)mhi_xml_numbers(o, node, "orientation", child_angles, 3);
     mhi_rotation_sequence("xyz", parent_angles, in_parent.r);
     mhi_rotation_sequence("xyz", child_angles, in_child.r);
-    set_frames(o, body, mhi_xml_word(o, node, "parent_body"), &in_parent, &in_child);
+    set_frames(body, mhi_xml_word(o, node, "parent_body"), &in_parent, &in_child);
+    build_motions(o, &j);
+    if (mhi_xml_flag(o, node, "reverse")) {
+        reverse_motions(o, body);
+    }
 }
 
-/* The body that a joint of 4.x carries; NULL after an error or for a joint that closes a loop. */
-static mhi_body_draft *frames_since_4(mhi_osim *o, xmlNode *node, const char *name) {
-    const char *owner = mhi_arena_format(&o->b.arena, "/jointset/%s", name);
+/* A joint of 4.x: the two bodies (NULL: ground) and its frames in them. */
+typedef struct ends {
+    mhi_osim_joint joint;
     const char *parent, *child;
     mhi_transform in_parent, in_child;
-    int32_t line = mhi_xml_line(node);
-    owner = owner != NULL ? owner : "";
-    if (!mhi_osim_resolve(o, mhi_osim_socket(o, node, "parent_frame"), owner, line, &parent,
-                          &in_parent) ||
-        !mhi_osim_resolve(o, mhi_osim_socket(o, node, "child_frame"), owner, line, &child,
-                          &in_child)) {
-        return NULL;
-    }
-    for (int32_t i = 0; child != NULL && i < o->b.bodies.n; i++) {
+    int32_t built;
+} ends;
+
+static mhi_body_draft *body_named(mhi_osim *o, const char *name) {
+    for (int32_t i = 0; name != NULL && i < o->b.bodies.n; i++) {
         mhi_body_draft *draft = o->b.bodies.items[i];
-        if (strcmp(draft->body.name, child) != 0) {
-            continue;
+        if (strcmp(draft->body.name, name) == 0) {
+            return draft;
         }
-        if (draft->carried) {
-            mhi_build_unsupported(&o->b, line, "%s '%s' closes a loop at body '%s'",
-                                  (const char *)node->name, name, child);
-            return NULL;
-        }
-        set_frames(o, draft, parent, &in_parent, &in_child);
-        return draft;
     }
-    mhi_build_fail(&o->b, line, "joint '%s' has ground as its child", name);
     return NULL;
 }
 
-void mhi_osim_joint(mhi_osim *o, xmlNode *node, mhi_body_draft *body) {
-    joint j = {.node = node, .name = mhi_xml_name(o, node), .body = body};
-    if (body != NULL) {
-        frames_before_4(o, node, body);
-    } else {
-        j.body = frames_since_4(o, node, j.name);
-    }
-    if (j.body == NULL) {
+static int32_t read_ends(mhi_osim *o, xmlNode *node, ends *e) {
+    const char *name = mhi_xml_name(o, node);
+    const char *owner = mhi_arena_format(&o->b.arena, "/jointset/%s", name);
+    int32_t line = mhi_xml_line(node);
+    *e = (ends){.joint = {.node = node, .name = name}};
+    return owner != NULL &&
+           mhi_osim_resolve(o, mhi_osim_socket(o, node, "parent_frame"), owner, line, &e->parent,
+                            &e->in_parent) &&
+           mhi_osim_resolve(o, mhi_osim_socket(o, node, "child_frame"), owner, line, &e->child,
+                            &e->in_child);
+}
+
+/* Joints whose child is carried already run the other way: their child carries their parent. What
+ * is left then closes a loop. */
+static void build_turned(mhi_osim *o, ends *e) {
+    mhi_osim_joint *j = &e->joint;
+    mhi_body_draft *parent = body_named(o, e->parent);
+    if (parent == NULL || parent->carried) {
+        mhi_osim_coordinates(o, j, 0);
+        mhi_build_unsupported(
+            &o->b, mhi_xml_line(j->node), "%s '%s' closes a loop at body '%s': it is left out",
+            (const char *)j->node->name, j->name, e->child != NULL ? e->child : "ground");
         return;
     }
-    if (mhi_xml_flag(o, node, "reverse")) {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node), "reversed joint '%s'", j.name);
-    }
-    for (size_t i = 0; i < sizeof plain_joints / sizeof *plain_joints; i++) {
-        if (mhi_xml_is(node, plain_joints[i].type)) {
-            read_coordinates(o, &j);
-            build_plain(o, &j, plain_joints[i].motions);
+    j->body = parent;
+    set_frames(parent, e->child, &e->in_child, &e->in_parent);
+    build_motions(o, j);
+    reverse_motions(o, parent);
+}
+
+/* A body that no joint carries floats freely, as OpenSim has it. */
+static void build_free(mhi_osim *o, mhi_body_draft *draft) {
+    xmlNode node = {.type = XML_ELEMENT_NODE,
+                    .name = (const xmlChar *)"FreeJoint",
+                    .line = (unsigned short)draft->line};
+    const char *name = mhi_arena_format(&o->b.arena, "free_%s", draft->body.name);
+    mhi_osim_joint j = {.node = &node, .name = name != NULL ? name : "", .body = draft};
+    draft->carried = 1;
+    mhi_build_warn(&o->b, draft->line, "body '%s' has no joint: it floats freely",
+                   draft->body.name);
+    build_motions(o, &j);
+}
+
+void mhi_osim_joints(mhi_osim *o) {
+    mhi_list joints = {0};
+    for (xmlNode *n = mhi_xml_objects(o->model, "JointSet"); n != NULL && o->b.status == MHE_OK;
+         n = mhi_xml_next(n)) {
+        ends *e = mhi_build_push(&o->b, &joints, sizeof *e);
+        if (e == NULL || !read_ends(o, n, e)) {
             return;
         }
+        e->joint.body = body_named(o, e->child);
+        if (e->joint.body != NULL && !e->joint.body->carried) {
+            set_frames(e->joint.body, e->parent, &e->in_parent, &e->in_child);
+            e->built = 1;
+        }
     }
-    if (mhi_xml_is(node, "CustomJoint")) {
-        read_coordinates(o, &j);
-        build_custom(o, &j);
-    } else {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node), "%s '%s' (held rigid)",
-                              (const char *)node->name, j.name);
+    for (int32_t i = 0; i < joints.n && o->b.status == MHE_OK;
+         i++) { /* coordinates in file order */
+        ends *e = joints.items[i];
+        if (e->built) {
+            build_motions(o, &e->joint);
+        } else {
+            build_turned(o, e);
+        }
+    }
+    for (int32_t i = 0; i < o->b.bodies.n && o->b.status == MHE_OK; i++) {
+        mhi_body_draft *draft = o->b.bodies.items[i];
+        if (!draft->carried) {
+            build_free(o, draft);
+        }
     }
 }
 
 void mhi_osim_bodies(mhi_osim *o) {
-    for (xmlNode *n = mhi_xml_objects(o, o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
+    for (xmlNode *n = mhi_xml_objects(o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
         const char *name = mhi_xml_name(o, n);
         if (!mhi_xml_is(n, "Body") || mhi_same_word(name, "ground")) {
             continue;
@@ -256,7 +283,7 @@ void mhi_osim_bodies(mhi_osim *o) {
             node = mhi_xml_first(mhi_xml_child(n, "joint"));
         }
         if (node != NULL) {
-            mhi_osim_joint(o, node, draft);
+            joint_before_4(o, node, draft);
         }
     }
 }

@@ -3,6 +3,7 @@
 #include "io/osim.h"
 
 #include <ctype.h>
+#include <math.h>
 #include <string.h>
 
 static xmlNode *element(xmlNode *node) {
@@ -49,7 +50,7 @@ xmlNode *mhi_xml_property(xmlNode *object, const char *name) {
 }
 
 /* Value of an attribute; "" where it is absent. */
-static const char *attribute(mhi_osim *o, const xmlNode *node, const char *name) {
+const char *mhi_xml_attribute(mhi_osim *o, const xmlNode *node, const char *name) {
     for (const xmlAttr *a = node->properties; a != NULL; a = a->next) {
         if (strcmp((const char *)a->name, name) == 0 && a->children != NULL &&
             a->children->type == XML_TEXT_NODE) {
@@ -61,7 +62,7 @@ static const char *attribute(mhi_osim *o, const xmlNode *node, const char *name)
 }
 
 const char *mhi_xml_name(mhi_osim *o, const xmlNode *node) {
-    return attribute(o, node, "name");
+    return mhi_xml_attribute(o, node, "name");
 }
 
 const char *mhi_xml_text(mhi_osim *o, const xmlNode *node) {
@@ -129,15 +130,79 @@ int32_t mhi_xml_numbers(mhi_osim *o, xmlNode *object, const char *name, double *
     return 1;
 }
 
-int32_t mhi_xml_flag(mhi_osim *o, xmlNode *object, const char *name) {
-    const char *text = mhi_xml_word(o, object, name);
-    return text != NULL && (mhi_same_word(text, "true") || strcmp(text, "1") == 0);
+/* A bound: a number or an infinity. */
+static int32_t read_bound(const char *text, size_t length, double *out) {
+    char word[16];
+    const char *plain = *text == '+' || *text == '-' ? text + 1 : text;
+    size_t rest = length - (size_t)(plain - text);
+    if (rest < sizeof word) {
+        memcpy(word, plain, rest);
+        word[rest] = '\0';
+        if (mhi_same_word(word, "inf") || mhi_same_word(word, "infinity")) {
+            *out = *text == '-' ? -INFINITY : INFINITY;
+            return 1;
+        }
+    }
+    return mhi_number((mhi_cell){text, length}, out);
 }
 
-xmlNode *mhi_xml_objects(mhi_osim *o, xmlNode *parent, const char *set) {
-    xmlNode *node = mhi_xml_child(parent, set);
-    if (node != NULL && *attribute(o, node, "file") != '\0') {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node), "<%s> kept in another file", set);
+static int32_t read_bounds(mhi_osim *o, xmlNode *object, const char *name, double *out,
+                           int32_t wanted) {
+    xmlNode *node = mhi_xml_property(object, name);
+    const char *text = mhi_xml_text(o, node);
+    double bounds[2];
+    int32_t n = 0, ok = 1;
+    if (*text == '\0') {
+        return 0;
     }
-    return mhi_xml_first(mhi_xml_child(node, "objects"));
+    while (*text != '\0' && ok) {
+        size_t length = strcspn(text, " \t\r\n,()");
+        ok = length == 0 || (n < wanted && read_bound(text, length, &bounds[n]));
+        n += length > 0;
+        text += length > 0 ? length : 1;
+    }
+    if (!ok || n != wanted) {
+        mhi_build_fail(&o->b, mhi_xml_line(node), "<%s> takes %d number%s, not '%s'", name,
+                       (int)wanted, wanted == 1 ? "" : "s", mhi_xml_text(o, node));
+        return 0;
+    }
+    memcpy(out, bounds, sizeof *out * (size_t)wanted);
+    return 1;
+}
+
+int32_t mhi_xml_range(mhi_osim *o, xmlNode *object, const char *name, double out[2]) {
+    return read_bounds(o, object, name, out, 2);
+}
+
+int32_t mhi_xml_bound(mhi_osim *o, xmlNode *object, const char *name, double *out) {
+    return read_bounds(o, object, name, out, 1);
+}
+
+int32_t mhi_xml_stated_flag(mhi_osim *o, xmlNode *object, const char *name) {
+    const char *text = mhi_xml_word(o, object, name);
+    return text == NULL ? -1 : mhi_same_word(text, "true") || strcmp(text, "1") == 0;
+}
+
+int32_t mhi_xml_flag(mhi_osim *o, xmlNode *object, const char *name) {
+    return mhi_xml_stated_flag(o, object, name) == 1;
+}
+
+int32_t mhi_xml_enabled(mhi_osim *o, xmlNode *object) {
+    return !mhi_xml_flag(o, object, "isDisabled") &&
+           mhi_xml_stated_flag(o, object, "appliesForce") != 0 &&
+           mhi_xml_stated_flag(o, object, "isEnforced") != 0 &&
+           mhi_xml_stated_flag(o, object, "enabled") != 0;
+}
+
+int32_t mhi_xml_one_of(const xmlNode *node, const char *const *names, size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (mhi_xml_is(node, names[i])) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
+xmlNode *mhi_xml_objects(xmlNode *parent, const char *set) {
+    return mhi_xml_first(mhi_xml_child(mhi_xml_child(parent, set), "objects"));
 }

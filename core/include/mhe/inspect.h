@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* inspect.h: what is in a model file, and what the model says at given poses. */
+#ifndef MHE_INSPECT_H
+#define MHE_INSPECT_H
+
+#include <mhe/host.h>
+#include <mhe/library.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* What is in the model file `file` (.osim, .bioMod): coordinates with their ranges, couplers and
+ * what is locked, bodies and masses, muscles with the coordinates that they cross, obstacles, other
+ * forces, markers; what is unsupported, left out or repaired, with file:line. `format`:
+ * MHE_FORMAT_TEXT or MHE_FORMAT_JSON. `host` may be NULL. `*text` is the caller's: mhe_free().
+ * MHE_E_INPUT: the file cannot be read. [cold] */
+MHE_API mhe_status mhe_model_info(const mhe_host *host, const char *file, int32_t format,
+                                  char **text, mhe_error *err);
+
+#define MHE_PATHS_EXACT 0
+#define MHE_PATHS_FITTED 1 /* polynomials that the model plugin fits to them */
+
+/* The model `file` at the poses of a JSON text `poses` [length], called `name` in messages:
+ *
+ *     {"poses": [{"q": {COORDINATE: rad or m}, "u": {...}, "udot": {...},
+ *                 "activation": 0.5 or {MUSCLE: 0.5},
+ *                 "forces": {MUSCLE or ACTUATOR: N or N m},
+ *                 "external": [{"body", "force", "point", "torque"}]}]}      all in ground
+ *
+ * What is left out has the model's default, or 0. Dependents and held coordinates are computed, not
+ * read; u and udot are derivatives of the coordinates. Locked coordinates have their value, but
+ * their u and udot are read, and enter inverse dynamics. The answer, JSON:
+ *
+ *     {"coordinates": [independent, free names],
+ *      "poses": [{"q", "udot": {every coordinate}, "bodies": {BODY: [x, y, z, rotation row by
+ * row]}, "markers": {MARKER: [x, y, z]}, "lines": {PATH: {"length", "speed", "moment_arm":
+ * {COORDINATE: -dL/dq}}}, "mass_matrix": [[...]], "inverse_dynamics": {COORDINATE: N m or N},
+ *                 "muscles": {MUSCLE: {"fiber_length", "fiber_velocity", "pennation", "active",
+ *                                      "passive", "tendon_force"}},    rigid tendons; by activation
+ *                 "reactions": {JOINT: {"force", "moment"}}}]}           where forces are given
+ *
+ * Muscles have rigid tendons; one that is slack is reported as OpenSim does: its fibre stands at
+ * the shortest, and a tendon never pushes (in a run the curves go on smoothly there).
+ *
+ * Inverse dynamics: M udot + bias - external loads, no muscles, by the free coordinates with what
+ * follows them. Reactions act on the child at the joint's frame in it, in ground; every load that
+ * is given acts. `*text` is the caller's: mhe_free(). MHE_E_INPUT: a file cannot be read, or names
+ * what the model has not. [cold] */
+MHE_API mhe_status mhe_model_evaluate(const mhe_host *host, const char *file, const char *name,
+                                      const char *poses, size_t length, int32_t paths, char **text,
+                                      mhe_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "inspect/inspected.h"
+
+#include "config/options.h"
+#include "io/model_file.h"
+#include "plugin/instance.h"
+
+#include <mhe/inspect.h>
+
+#include <math.h>
+#include <string.h>
+
+#define MODEL_PLUGIN "mhe.model.simbody"
+#define MUSCLE_PLUGIN "mhe.muscle.hill"
+
+/* The plugin, and a config of defaults and one key set to one word. */
+static mhe_status find(mhi_inspected *m, const char *id, const char *iface, const char *yaml,
+                       const mhe_plugin **plugin, const void **config, mhe_error *err) {
+    mhi_tree *tree = NULL;
+    mhe_status status = mhi_registry_find(m->registry, id, iface, plugin, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    void *filled = mhi_arena_take(&m->arena, (*plugin)->config_size);
+    if (filled == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    status = mhi_tree_parse(id, yaml, strlen(yaml), &tree, err);
+    if (status == MHE_OK) {
+        status = mhi_options_fill((*plugin)->options, (int32_t)(*plugin)->option_count, tree,
+                                  mhi_tree_root(tree), NULL, 0, id, ".", &m->arena, filled, err);
+    }
+    mhi_tree_free(tree);
+    *config = filled;
+    return status;
+}
+
+mhe_status mhi_skeleton_open(const mhi_inspected *m, const mhe_description *description,
+                             mhi_skeleton *skeleton, mhe_error *err) {
+    *skeleton = (mhi_skeleton){.description = description, .ops = m->model->ops};
+    mhe_status status =
+        mhi_model_create(m->model, m->host, description, m->model_config, &skeleton->self, err);
+    return status != MHE_OK
+               ? status
+               : skeleton->ops->context_create(skeleton->self, &skeleton->context, err);
+}
+
+void mhi_skeleton_close(mhi_skeleton *skeleton) {
+    if (skeleton->context != NULL) {
+        skeleton->ops->context_destroy(skeleton->context);
+    }
+    if (skeleton->self != NULL) {
+        skeleton->ops->destroy(skeleton->self);
+    }
+    *skeleton = (mhi_skeleton){0};
+}
+
+/* Where the free coordinates stand among all of them. */
+static mhe_status find_places(mhi_inspected *m, mhe_error *err) {
+    m->place = MHI_TAKE(&m->arena, int32_t, m->file->n_coordinates);
+    if (m->place == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0, k = 0; i < m->file->n_coordinates; i++, k++) { /* the same order */
+        while (strcmp(m->all->coordinates[k].name, m->file->coordinates[i].name) != 0) {
+            k++;
+        }
+        m->place[i] = k;
+    }
+    return MHE_OK;
+}
+
+static mhe_status open_muscles(mhi_inspected *m, mhe_error *err) {
+    const mhe_plugin *plugin;
+    const void *config;
+    mhe_status status = m->all->n_muscles == 0
+                            ? MHE_OK
+                            : find(m, MUSCLE_PLUGIN, MHE_MUSCLE_IFACE, "{}", &plugin, &config, err);
+    if (status != MHE_OK || m->all->n_muscles == 0) {
+        return status;
+    }
+    m->layout.size = sizeof m->layout;
+    status = mhi_muscle_create(plugin, m->host, m->all->muscles, m->all->n_muscles, config,
+                               &m->muscles, &m->layout, err);
+    m->muscle = plugin->ops;
+    return status;
+}
+
+mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char *file,
+                              int32_t paths, mhe_error *err) {
+    *m = (mhi_inspected){.host = mhi_host_or_silent(host)};
+    mhe_status status = mhi_model_read(file, &m->file, err);
+    if (status == MHE_OK) {
+        status = mhi_model_read_unlocked(file, &m->all, err);
+    }
+    if (status == MHE_OK) {
+        status = find_places(m, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_registry_create(m->host, &m->registry, err);
+    }
+    if (status == MHE_OK) {
+        status = find(m, MODEL_PLUGIN, MHE_MODEL_IFACE,
+                      paths == MHE_PATHS_FITTED ? "{paths: fitted}" : "{}", &m->model,
+                      &m->model_config, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_skeleton_open(m, m->all, &m->skeleton, err);
+    }
+    return status != MHE_OK ? status : open_muscles(m, err);
+}
+
+void mhi_inspected_close(mhi_inspected *m) {
+    if (m->muscles != NULL) {
+        m->muscle->destroy(m->muscles);
+    }
+    mhi_skeleton_close(&m->skeleton);
+    mhi_registry_free(m->registry);
+    mhi_description_free(m->all);
+    mhi_description_free(m->file);
+    mhi_arena_free(&m->arena);
+}
+
+void mhi_json_number(cJSON *object, const char *name, double value) {
+    if (isfinite(value)) {
+        (void)cJSON_AddNumberToObject(object, name, value);
+    } else {
+        (void)cJSON_AddNullToObject(object, name);
+    }
+}
+
+cJSON *mhi_json_numbers(const double *values, int32_t n) {
+    cJSON *list = cJSON_CreateArray();
+    for (int32_t i = 0; i < n; i++) {
+        (void)cJSON_AddItemToArray(list, isfinite(values[i]) ? cJSON_CreateNumber(values[i])
+                                                             : cJSON_CreateNull());
+    }
+    return list;
+}

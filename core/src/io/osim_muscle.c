@@ -1,0 +1,225 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* osim_muscle.c: muscles and their parameters. */
+#include "io/osim.h"
+
+#include <math.h>
+#include <string.h>
+
+static int32_t ends_with(const char *text, const char *ending) {
+    size_t n = strlen(text), k = strlen(ending);
+    return n >= k && strcmp(text + n - k, ending) == 0;
+}
+
+int32_t mhi_osim_is_muscle(const xmlNode *node) {
+    const char *type = (const char *)node->name;
+    return ends_with(type, "Muscle") || ends_with(type, "Muscle_Deprecated");
+}
+
+typedef struct parameter {
+    const char *tag;
+    double *out;
+    double otherwise; /* what OpenSim takes where file and <defaults> are silent; NaN: the muscle
+                       * plugin decides */
+} parameter;
+
+static void read_all(mhi_osim *o, xmlNode *node, const parameter *table, size_t n,
+                     const char *whose) {
+    for (size_t i = 0; i < n; i++) {
+        (void)mhi_xml_numbers(o, node, table[i].tag, table[i].out, 1);
+        if (isnan(*table[i].out) && !isnan(table[i].otherwise)) {
+            *table[i].out = table[i].otherwise;
+            if (table[i].otherwise != 0) {
+                mhi_build_warn(&o->b, mhi_xml_line(node),
+                               "muscle '%s' has no %s: OpenSim's default %g taken", whose,
+                               table[i].tag, table[i].otherwise);
+            }
+        }
+    }
+}
+
+static void read_common(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    const parameter table[] = {{"max_isometric_force", &m->max_isometric_force, 1000},
+                               {"optimal_fiber_length", &m->optimal_fiber_length, 0.1},
+                               {"tendon_slack_length", &m->tendon_slack_length, 0.2},
+                               {"pennation_angle", &m->pennation_angle, NAN},
+                               {"pennation_angle_at_optimal", &m->pennation_angle, 0},
+                               {"maximum_pennation_angle", &m->maximum_pennation_angle, NAN},
+                               {"max_contraction_velocity", &m->max_contraction_velocity, NAN},
+                               {"Vmax", &m->max_contraction_velocity, NAN},
+                               {"activation_time_constant", &m->activation_time, NAN},
+                               {"deactivation_time_constant", &m->deactivation_time, NAN},
+                               {"minimum_activation", &m->minimum_activation, NAN},
+                               {"fiber_damping", &m->fiber_damping, NAN},
+                               {"FmaxMuscleStrain", &m->passive_strain, NAN},
+                               {"passive_fiber_strain_at_one_norm_force", &m->passive_strain, NAN},
+                               {"KshapePassive", &m->passive_shape, NAN},
+                               {"KshapeActive", &m->active_shape, NAN},
+                               {"Af", &m->velocity_shape, NAN},
+                               {"Flen", &m->max_lengthening_force, NAN},
+                               {"FmaxTendonStrain", &m->tendon_strain, NAN},
+                               {"tendon_strain_at_one_norm_force", &m->tendon_strain, NAN}};
+    read_all(o, node, table, sizeof table / sizeof *table, m->name);
+    (void)mhi_xml_bound(o, node, "min_control", &m->min_control);
+    (void)mhi_xml_bound(o, node, "max_control", &m->max_control);
+    m->ignore_tendon_compliance = mhi_xml_stated_flag(o, node, "ignore_tendon_compliance");
+    m->ignore_activation_dynamics = mhi_xml_stated_flag(o, node, "ignore_activation_dynamics");
+}
+
+/* The curve object of a Millard muscle: its own child, or that of <defaults>. */
+static void read_curve(mhi_osim *o, xmlNode *node, const char *type, const parameter *table,
+                       size_t n, const char *whose) {
+    xmlNode *curve = mhi_xml_property(node, type);
+    if (curve != NULL) {
+        read_all(o, curve, table, n, whose);
+    }
+}
+
+static void read_millard(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    mhe_millard_curves *c = &m->millard;
+    const parameter active[] = {
+        {"min_norm_active_fiber_length", &c->min_norm_active_fiber_length, NAN},
+        {"transition_norm_fiber_length", &c->transition_norm_fiber_length, NAN},
+        {"max_norm_active_fiber_length", &c->max_norm_active_fiber_length, NAN},
+        {"shallow_ascending_slope", &c->shallow_ascending_slope, NAN},
+        {"minimum_value", &c->minimum_value, NAN}};
+    const parameter velocity[] = {
+        {"concentric_slope_at_vmax", &c->concentric_slope_at_vmax, NAN},
+        {"concentric_slope_near_vmax", &c->concentric_slope_near_vmax, NAN},
+        {"isometric_slope", &c->isometric_slope, NAN},
+        {"eccentric_slope_at_vmax", &c->eccentric_slope_at_vmax, NAN},
+        {"eccentric_slope_near_vmax", &c->eccentric_slope_near_vmax, NAN},
+        {"max_eccentric_velocity_force_multiplier", &c->max_eccentric_velocity_force_multiplier,
+         NAN},
+        {"concentric_curviness", &c->concentric_curviness, NAN},
+        {"eccentric_curviness", &c->eccentric_curviness, NAN}};
+    const parameter passive[] = {
+        {"strain_at_zero_force", &c->fiber_strain_at_zero_force, NAN},
+        {"strain_at_one_norm_force", &c->fiber_strain_at_one_norm_force, NAN},
+        {"stiffness_at_low_force", &c->fiber_stiffness_at_low_force, NAN},
+        {"stiffness_at_one_norm_force", &c->fiber_stiffness_at_one_norm_force, NAN},
+        {"curviness", &c->fiber_curviness, NAN}};
+    const parameter tendon[] = {
+        {"strain_at_one_norm_force", &c->tendon_strain_at_one_norm_force, NAN},
+        {"stiffness_at_one_norm_force", &c->tendon_stiffness_at_one_norm_force, NAN},
+        {"norm_force_at_toe_end", &c->tendon_norm_force_at_toe_end, NAN},
+        {"curviness", &c->tendon_curviness, NAN}};
+    read_curve(o, node, "ActiveForceLengthCurve", active, sizeof active / sizeof *active, m->name);
+    read_curve(o, node, "ForceVelocityCurve", velocity, sizeof velocity / sizeof *velocity,
+               m->name);
+    read_curve(o, node, "FiberForceLengthCurve", passive, sizeof passive / sizeof *passive,
+               m->name);
+    read_curve(o, node, "TendonForceLengthCurve", tendon, sizeof tendon / sizeof *tendon, m->name);
+}
+
+static void read_acceleration(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    read_millard(o, node, m);
+    mhi_build_warn(&o->b, mhi_xml_line(node),
+                   "Millard2012AccelerationMuscle '%s' is taken without its fibre mass, as "
+                   "Millard2012EquilibriumMuscle",
+                   m->name);
+}
+
+static void read_degroote(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    double width = 1;
+    (void)mhi_xml_numbers(o, node, "active_force_width_scale", &width, 1);
+    if (width != 1) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node),
+                              "active_force_width_scale %g of muscle '%s': 1 taken, its active "
+                              "curve is narrower",
+                              width, m->name);
+    }
+    if (mhi_xml_flag(o, node, "ignore_passive_fiber_force")) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node),
+                              "ignore_passive_fiber_force of muscle '%s': its passive force acts",
+                              m->name);
+    }
+}
+
+/* A curve that stands in the file as a function. */
+static void read_file_curve(mhi_osim *o, xmlNode *node, const char *tag, mhe_function *out,
+                            const char *whose) {
+    if (mhi_osim_function_of(o, node, tag, whose, out) == 0) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node), "muscle '%s' states no %s: it has none",
+                              whose, tag);
+    }
+}
+
+static void read_file_curves(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    read_file_curve(o, node, "active_force_length_curve", &m->active_force_length, m->name);
+    read_file_curve(o, node, "passive_force_length_curve", &m->passive_force_length, m->name);
+}
+
+/* Schutte's activation: rate (e - a)(k1 e + k2) / time_scale rising, (e - a) k2 / time_scale
+ * falling: time constants at full excitation and of the decay. */
+static void read_schutte(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    double scale = 0.1, k1 = 7.667, k2 = 1.459854, damping = 0.1;
+    (void)mhi_xml_numbers(o, node, "time_scale", &scale, 1);
+    (void)mhi_xml_numbers(o, node, "activation1", &k1, 1);
+    (void)mhi_xml_numbers(o, node, "activation2", &k2, 1);
+    (void)mhi_xml_numbers(o, node, "damping", &damping, 1);
+    if (!(scale > 0 && k1 >= 0 && k2 > 0)) {
+        mhi_build_fail(&o->b, mhi_xml_line(node),
+                       "muscle '%s': time_scale %g, activation1 %g and activation2 %g need to be "
+                       "> 0",
+                       m->name, scale, k1, k2);
+        return;
+    }
+    m->activation_time = scale / (k1 + k2);
+    m->deactivation_time = scale / k2;
+    m->fiber_damping = damping;
+    m->max_contraction_velocity = 1 / scale;
+    read_file_curves(o, node, m);
+    read_file_curve(o, node, "tendon_force_length_curve", &m->tendon_force_length, m->name);
+}
+
+static void read_rigid(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    read_file_curves(o, node, m);
+    read_file_curve(o, node, "force_velocity_curve", &m->force_velocity, m->name);
+}
+
+/* The curves of the muscle's type. */
+static void read_type(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
+    static const struct {
+        const char *tag;
+        int32_t type;
+        void (*read)(mhi_osim *, xmlNode *, mhe_muscle *);
+    } types[] = {{"Thelen2003Muscle", MHE_MUSCLE_THELEN2003, NULL},
+                 {"Millard2012EquilibriumMuscle", MHE_MUSCLE_MILLARD2012, read_millard},
+                 {"Millard2012AccelerationMuscle", MHE_MUSCLE_MILLARD2012, read_acceleration},
+                 {"DeGrooteFregly2016Muscle", MHE_MUSCLE_DEGROOTE2016, read_degroote},
+                 {"Schutte1993Muscle_Deprecated", MHE_MUSCLE_SCHUTTE1993, read_schutte},
+                 {"Schutte1993Muscle", MHE_MUSCLE_SCHUTTE1993, read_schutte},
+                 {"RigidTendonMuscle", MHE_MUSCLE_RIGID, read_rigid}};
+    for (size_t i = 0; i < sizeof types / sizeof *types; i++) {
+        if (mhi_xml_is(node, types[i].tag)) {
+            m->type = types[i].type;
+            if (types[i].read != NULL) {
+                types[i].read(o, node, m);
+            }
+            return;
+        }
+    }
+    mhi_build_unsupported(&o->b, mhi_xml_line(node),
+                          "the curves of %s '%s': those of the muscle plugin's own choice act",
+                          (const char *)node->name, m->name);
+}
+
+void mhi_osim_muscle(mhi_osim *o, xmlNode *node) {
+    const char *name = mhi_xml_name(o, node);
+    mhi_path_draft path;
+    if (!mhi_osim_path(o, node, "muscle", &path)) {
+        return;
+    }
+    mhi_muscle_draft *draft = mhi_build_muscle(&o->b, name, mhi_xml_line(node));
+    if (draft != NULL) {
+        draft->path = path;
+        read_common(o, node, &draft->muscle);
+        if (draft->muscle.max_contraction_velocity == 0) { /* OpenSim loads it; it cannot move */
+            mhi_build_warn(&o->b, draft->line,
+                           "muscle '%s' has max_contraction_velocity 0: the default is taken",
+                           name);
+            draft->muscle.max_contraction_velocity = NAN;
+        }
+        read_type(o, node, &draft->muscle);
+    }
+}
