@@ -97,5 +97,7 @@ void mhi_check_loads(mhi_kit *kit, const mhe_model_ops *ops, void *const *contex
                      const double *body, const double *body_q, const double *const *in, int turn);
 void mhi_check_integrator(mhi_kit *kit);
 void mhi_check_solver(mhi_kit *kit);
+void mhi_check_source(mhi_kit *kit);
+void mhi_check_sink(mhi_kit *kit);
 
 #endif
