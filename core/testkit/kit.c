@@ -11,7 +11,9 @@
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
+#include <mhe/sink.h>
 #include <mhe/solver.h>
+#include <mhe/source.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -121,7 +123,8 @@ static const struct {
 } interfaces[] = {
     {MHE_COST_IFACE, mhi_check_cost},     {MHE_MUSCLE_IFACE, mhi_check_muscle},
     {MHE_MODEL_IFACE, mhi_check_model},   {MHE_INTEGRATOR_IFACE, mhi_check_integrator},
-    {MHE_SOLVER_IFACE, mhi_check_solver}, {MHE_FORCE_IFACE, mhi_check_force},
+    {MHE_SOLVER_IFACE, mhi_check_solver}, {MHE_SOURCE_IFACE, mhi_check_source},
+    {MHE_SINK_IFACE, mhi_check_sink}, {MHE_FORCE_IFACE, mhi_check_force},
 };
 
 /* The defaults; a plugin with a required option cannot be created without knowing what it means. */

@@ -98,5 +98,7 @@ void mhi_check_loads(mhi_kit *kit, const mhe_model_ops *ops, void *const *contex
 void mhi_check_integrator(mhi_kit *kit);
 void mhi_check_solver(mhi_kit *kit);
 void mhi_check_parameters(mhi_kit *kit); /* of a solver */
+void mhi_check_source(mhi_kit *kit);
+void mhi_check_sink(mhi_kit *kit);
 
 #endif

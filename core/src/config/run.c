@@ -204,23 +204,25 @@ static mhe_status read_use(const struct reader *r, const mhi_section *section, c
     use->weight = own->weight;
     use->sigma = own->sigma;
     use->huber = own->huber;
+    use->delay = own->delay;
     return status;
 }
 
-static mhe_status read_costs(const struct reader *r, const mhi_node *owner, const mhi_node *list,
-                             mhi_use **uses, int32_t *n_uses) {
-    int32_t n = 0;
-    const mhi_section *section = mhi_run_sections(&n);
-    while (section->iface == NULL || strcmp(section->iface, MHE_COST_IFACE) != 0) {
-        section++;
+/* The plugins of a list (NULL: there is none). `owner` stands for it in messages where it is
+ * missing. */
+static mhe_status read_list(const struct reader *r, const mhi_section *section,
+                            const mhi_node *owner, const mhi_node *list, mhi_use_list *out) {
+    *out = (mhi_use_list){NULL, 0};
+    if (list == NULL && section->list == 1) {
+        return MHE_OK;
     }
-    if (list == NULL || list->kind != MHI_SEQUENCE || list->first == NULL) {
+    if (list == NULL || list->kind != MHI_SEQUENCE || (list->first == NULL && section->list == 2)) {
         return mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, list != NULL ? list : owner,
-                           "costs: a list with at least one entry is needed, like "
-                           "[{plugin: ID}]");
+                           "%s: a list%s is needed, like [{plugin: ID}]", section->name,
+                           section->list == 2 ? " with at least one entry" : "");
     }
-    *n_uses = mhi_node_count(list);
-    mhi_use *use = *uses = MHI_TAKE(&r->run->arena, mhi_use, *n_uses);
+    out->n = mhi_node_count(list);
+    mhi_use *use = out->uses = MHI_TAKE(&r->run->arena, mhi_use, out->n);
     if (use == NULL) {
         return no_memory(r);
     }
@@ -235,16 +237,34 @@ static mhe_status read_costs(const struct reader *r, const mhi_node *owner, cons
     return status;
 }
 
+static mhe_status read_costs(const struct reader *r, const mhi_node *owner, const mhi_node *list,
+                             mhi_use **uses, int32_t *n_uses) {
+    int32_t n = 0;
+    const mhi_section *section = mhi_run_sections(&n);
+    while (section->iface == NULL || strcmp(section->iface, MHE_COST_IFACE) != 0) {
+        section++;
+    }
+    mhi_use_list found;
+    const mhe_status status = read_list(r, section, owner, list, &found);
+    *uses = found.uses;
+    *n_uses = found.n;
+    return status;
+}
+
 static mhe_status read_plugin_section(const struct reader *r, const mhi_section *s) {
     mhi_run *run = r->run;
+    const mhi_node *node = section_node(run, s->name);
     if (strcmp(s->iface, MHE_COST_IFACE) == 0) {
-        const mhi_node *list = section_node(run, s->name);
         return r->scope == SCOPE_STEPS ? MHE_OK
-                                       : read_costs(r, NULL, list, &run->costs, &run->n_costs);
+                                       : read_costs(r, NULL, node, &run->costs, &run->n_costs);
+    }
+    void *part = (unsigned char *)run + s->offset;
+    if (s->list) {
+        return read_list(r, s, NULL, node, part);
     }
     mhi_use_section own = {0};
-    mhi_use *use = (mhi_use *)(void *)((unsigned char *)run + s->offset);
-    mhe_status status = read_use(r, s, section_node(run, s->name), use, &own);
+    mhi_use *use = part;
+    mhe_status status = read_use(r, s, node, use, &own);
     if (use == &run->model) {
         run->model_file = (mhi_model_section){.file = own.file,
                                               .unsupported = own.unsupported,

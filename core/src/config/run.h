@@ -17,7 +17,14 @@ typedef struct mhi_use {
     const void *config;          /* plugin->config_size bytes */
     const mhi_node *node;        /* for messages */
     double weight, sigma, huber; /* costs only: common options */
+    double delay;                /* sources only: s by which what they send is late */
 } mhi_use;
+
+/* Plugins of a section that is a list. */
+typedef struct mhi_use_list {
+    mhi_use *uses;
+    int32_t n;
+} mhi_use_list;
 
 #define MHI_UNSUPPORTED_STOP 0
 #define MHI_UNSUPPORTED_WARN 1
@@ -124,6 +131,7 @@ typedef struct mhi_run {
     mhi_use model, muscle, integrator, solver;
     mhi_use *costs;
     int32_t n_costs;
+    mhi_use_list sources, sinks; /* of live runs */
     int32_t formulation;       /* MHE_FORMULATION_* */
     mhe_text_list plugin_path; /* absolute folders */
     mhi_model_section model_file;
@@ -146,8 +154,9 @@ typedef struct mhi_section {
     const char *iface; /* of the plugin that the section names (its options are keys too); NULL */
     const mhe_option *options;
     int32_t n_options;
-    uint32_t offset; /* in mhi_run: the section's struct or, with iface, its mhi_use; 0 for "" and
-                      * costs */
+    uint32_t offset; /* in mhi_run: the section's struct or, with iface, its mhi_use; with `list` its
+                      * mhi_use_list; 0 for "" and costs */
+    int32_t list;    /* 1: a list of plugins; 2: one that may not be empty */
 } mhi_section;
 
 /* xyz of the recording's frame, a point or a direction (of a force, which is not scaled), in the

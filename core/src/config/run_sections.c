@@ -7,7 +7,9 @@
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
+#include <mhe/sink.h>
 #include <mhe/solver.h>
+#include <mhe/source.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
@@ -191,8 +193,23 @@ static const mhe_option output_options[] = {
                 "Estimates at the end that the errors in summary.json leave out."),
 };
 
+static const mhe_option source_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, MHE_OPT_REQUIRED, NULL, "Id of the plugin."),
+    MHE_OPT_REAL(
+        mhi_use_section, delay, 0, -10, 10, "s",
+        "By which its data come late beyond what its stamps say: a constant of the device, "
+        "taken off its times."),
+};
+
+static const mhe_option sink_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, MHE_OPT_REQUIRED, NULL, "Id of the plugin."),
+};
+
+#define ENTRIES(table) table, (int32_t)(sizeof(table) / sizeof((table)[0]))
 #define SECTION(name, help, iface, table, offset) \
-    { name, help, iface, table, (int32_t)(sizeof(table) / sizeof((table)[0])), offset }
+    { name, help, iface, ENTRIES(table), offset, 0 }
+#define LIST(name, help, iface, table, offset, kind) \
+    { name, help, iface, ENTRIES(table), offset, kind }
 #define AT(field) ((uint32_t)offsetof(mhi_run, field))
 
 static const mhi_section sections[] = {
@@ -216,12 +233,23 @@ static const mhi_section sections[] = {
     SECTION("bounds", "Bounds of states and controls.", NULL, bounds_options, AT(bounds)),
     SECTION("integrator", "How the state is carried over an interval.", MHE_INTEGRATOR_IFACE,
             integrator_options, AT(integrator)),
-    SECTION("costs", "A list: what the estimate is to be close to.", MHE_COST_IFACE, cost_options,
-            0),
+    LIST("costs", "A list: what the estimate is to be close to.", MHE_COST_IFACE, cost_options, 0,
+         2),
     SECTION("solver", "How a window is solved.", MHE_SOLVER_IFACE, solver_options, AT(solver)),
     SECTION("realtime", "Limits of live use.", NULL, realtime_options, AT(realtime)),
     SECTION("output", "What is made of the results.", NULL, output_options, AT(output)),
+    LIST("sources", "A list: where live data come from (mhe-live).", MHE_SOURCE_IFACE,
+         source_options, AT(sources), 1),
+    LIST("sinks", "A list: where live estimates go (mhe-live).", MHE_SINK_IFACE, sink_options,
+         AT(sinks), 1),
 };
+
+mhi_use_list mhi_run_list(const mhi_run *run, const mhi_section *section) {
+    if (section->offset == 0) {
+        return (mhi_use_list){run->costs, run->n_costs};
+    }
+    return *(const mhi_use_list *)(const void *)((const char *)run + section->offset);
+}
 
 const mhi_section *mhi_run_sections(int32_t *n) {
     *n = (int32_t)(sizeof sections / sizeof sections[0]);

@@ -19,6 +19,7 @@ typedef struct mhi_use_section {
     mhe_text_list locked;        /* model */
     mhe_text_map locked_at;      /* model */
     double weight, sigma, huber; /* costs */
+    double delay;                /* sources */
 } mhi_use_section;
 
 /* The file, or `text` where it is not NULL, into run->tree, its path, name and folder into `run`;
@@ -35,6 +36,9 @@ void mhi_run_write_channels(const mhi_run *run, mhi_text *out);
  * the turn computed after it. [cold] */
 void mhi_run_flatten_rotate(const mhi_run *run);
 mhe_status mhi_run_check_transform(mhi_run *run, mhe_error *err);
+
+/* The plugins of a section that is a list; the costs' pair is kept as two fields. */
+mhi_use_list mhi_run_list(const mhi_run *run, const mhi_section *section);
 
 /* Is every output.formats one that there is? (run_output.c). [cold] */
 mhe_status mhi_run_check_formats(const mhi_run *run, mhe_error *err);

@@ -21,13 +21,13 @@ static mhe_status expand_short_forms(mhi_run *run, mhe_error *err) {
         if (node == NULL || sections[i].iface == NULL) {
             continue;
         }
-        if (strcmp(sections[i].iface, MHE_COST_IFACE) != 0) {
+        if (!sections[i].list) {
             status = mhi_node_expand(run->tree, node, "plugin", err);
             continue;
         }
-        for (mhi_node *cost = node->kind == MHI_SEQUENCE ? node->first : NULL;
-             cost != NULL && status == MHE_OK; cost = cost->next) {
-            status = mhi_node_expand(run->tree, cost, "plugin", err);
+        for (mhi_node *entry = node->kind == MHI_SEQUENCE ? node->first : NULL;
+             entry != NULL && status == MHE_OK; entry = entry->next) {
+            status = mhi_node_expand(run->tree, entry, "plugin", err);
         }
     }
     return status;

@@ -16,16 +16,18 @@ static void write_use(const mhi_run *run, const mhi_section *section, const mhi_
                                  .locked_at = run->model_file.locked_at,
                                  .weight = use->weight,
                                  .sigma = use->sigma,
-                                 .huber = use->huber};
+                                 .huber = use->huber,
+                                 .delay = use->delay};
     mhi_options_write(section->options, section->n_options, &own, indent, out);
     mhi_options_write(use->plugin->options, (int32_t)use->plugin->option_count, use->config, indent,
                       out);
 }
 
-static void write_costs(const mhi_run *run, const mhi_section *section, mhi_text *out) {
-    for (int32_t i = 0; i < run->n_costs; i++) {
+static void write_list(const mhi_run *run, const mhi_section *section, mhi_text *out) {
+    const mhi_use_list list = mhi_run_list(run, section);
+    for (int32_t i = 0; i < list.n; i++) {
         size_t start = out->length;
-        write_use(run, section, &run->costs[i], 4, out);
+        write_use(run, section, &list.uses[i], 4, out);
         if (!out->failed) {
             out->data[start + 2] = '-'; /* "    plugin: ..." starts a list entry */
         }
@@ -62,11 +64,14 @@ void mhi_run_write(const mhi_run *run, mhi_text *out) {
             mhi_options_write(s->options, s->n_options, part, 4, out);
             continue;
         }
+        if (s->list && mhi_run_list(run, s).n == 0) {
+            continue;
+        }
         mhi_text_add(out, "%s:\n", s->name);
         if (s->iface == NULL) {
             mhi_options_write(s->options, s->n_options, part, 2, out);
-        } else if (strcmp(s->iface, MHE_COST_IFACE) == 0) {
-            write_costs(run, s, out);
+        } else if (s->list) {
+            write_list(run, s, out);
         } else {
             write_use(run, s, part, 2, out);
         }

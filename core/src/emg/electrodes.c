@@ -235,3 +235,12 @@ void mhi_electrodes_at(const mhi_electrodes *e, double time, double *emg) {
         emg[w->muscle] = isnan(value) ? NAN : fmin(fmax(value, 0), e->max);
     }
 }
+
+int32_t mhi_electrodes_peak(mhi_electrodes *e, int32_t channel, int32_t reset, double *peak) {
+    if (channel < 0 || channel >= e->n_channels || e->column[channel] < 0) {
+        return 0;
+    }
+    *peak = e->peaks[channel] / e->scale[channel];
+    e->peaks[channel] = reset ? NAN : e->peaks[channel];
+    return 1;
+}

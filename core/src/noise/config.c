@@ -82,7 +82,7 @@ static const mhe_option output_options[] = {
 
 /* In the order of the file; a name with a dot is a section in a section. */
 #define SECTION(name, help, table, offset) \
-    { name, help, NULL, table, (int32_t)(sizeof(table) / sizeof((table)[0])), offset }
+    { name, help, NULL, table, (int32_t)(sizeof(table) / sizeof((table)[0])), offset, 0 }
 #define AT(field) ((uint32_t)offsetof(mhi_noise_config, field))
 
 static const mhi_section sections[] = {

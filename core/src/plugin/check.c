@@ -8,7 +8,9 @@
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
+#include <mhe/sink.h>
 #include <mhe/solver.h>
+#include <mhe/source.h>
 #include <string.h>
 
 /* A table larger than this is taken for garbage, not for a newer version. */
@@ -58,6 +60,16 @@ static const interface interfaces[] = {
      {FN(mhe_integrator_ops, create), FN(mhe_integrator_ops, destroy),
       FN(mhe_integrator_ops, context_create), FN(mhe_integrator_ops, context_destroy),
       FN(mhe_integrator_ops, step)},
+     {{NULL, 0}, {NULL, 0}}},
+    {MHE_SOURCE_IFACE,
+     sizeof(mhe_source_ops),
+     {FN(mhe_source_ops, create), FN(mhe_source_ops, destroy), FN(mhe_source_ops, open),
+      FN(mhe_source_ops, count), FN(mhe_source_ops, stream), FN(mhe_source_ops, read)},
+     {{NULL, 0}, {NULL, 0}}},
+    {MHE_SINK_IFACE,
+     sizeof(mhe_sink_ops),
+     {FN(mhe_sink_ops, create), FN(mhe_sink_ops, destroy), FN(mhe_sink_ops, open),
+      FN(mhe_sink_ops, take), FN(mhe_sink_ops, close)},
      {{NULL, 0}, {NULL, 0}}},
     {MHE_SOLVER_IFACE,
      sizeof(mhe_solver_ops),

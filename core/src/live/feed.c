@@ -1,0 +1,261 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "live/feed.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define WAITING 256 /* frames that may wait for their EMG; more are no longer in any window */
+#define FORGET 1e-6 /* s a sample by which the guess of a clock gives way: it may drift */
+
+mhe_status mhi_feed_open(mhi_feed *f, const mhe_host *host, const mhi_run *run,
+                         const mhe_description *model, mhe_estimator *estimator, mhe_error *err) {
+    *f = (mhi_feed){.info = {.size = sizeof f->info},
+                    .estimator = estimator,
+                    .sources = run->sources.uses,
+                    .n_sources = run->sources.n,
+                    .driver = -1,
+                    .last = -INFINITY};
+    mhe_status status = mhe_estimator_describe(estimator, &f->info);
+    f->setup = (mhi_inlet_setup){host, run, model, &f->info};
+    f->waiting = calloc(WAITING, sizeof *f->waiting);
+    f->channels = calloc((size_t)f->info.n_channels + 1, sizeof *f->channels);
+    if (status == MHE_OK && (f->waiting == NULL || f->channels == NULL)) {
+        status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    return status;
+}
+
+void mhi_feed_close(mhi_feed *f) {
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        mhi_inlet_close(&f->inlets[i]);
+    }
+    free(f->waiting);
+    free(f->channels);
+    f->waiting = NULL;
+    f->channels = NULL;
+    f->n_inlets = 0;
+}
+
+mhi_inlet *mhi_feed_inlet(mhi_feed *f, int32_t source, int32_t stream) {
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        if (f->inlets[i].source == source && f->inlets[i].stream == stream) {
+            return &f->inlets[i];
+        }
+    }
+    return NULL;
+}
+
+static void warn(const mhi_feed *f, const char *text) {
+    f->setup.host->log(f->setup.host, MHE_LOG_WARNING, text);
+}
+
+/* A stream that is new, or that is another now. Two of one kind: the first is taken. */
+static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
+    mhi_inlet *in = mhi_feed_inlet(f, p->source, p->stream);
+    const double delay = p->source < f->n_sources ? f->sources[p->source].delay : 0;
+    if (in == NULL && f->n_inlets == MHI_FEED_INLETS) {
+        warn(f, "more than 64 streams: the others are passed over");
+        return MHE_OK;
+    }
+    mhi_inlet fresh;
+    mhe_status status =
+        mhi_inlet_open(&f->setup, p->about, p->source, p->stream, delay, &fresh, err);
+    if (status != MHE_OK && f->running) { /* a run goes on without it */
+        warn(f, err->text);
+        status = MHE_OK;
+    }
+    if (status != MHE_OK) {
+        mhi_inlet_close(&fresh);
+        return status;
+    }
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        const mhi_inlet *other = &f->inlets[i];
+        if (other != in && other->channel >= 0 && other->channel == fresh.channel) {
+            char text[300];
+            (void)snprintf(
+                text, sizeof text,
+                "streams '%.100s' and '%.100s' are of one kind: the second is passed over",
+                other->name, fresh.name);
+            warn(f, text);
+            fresh.channel = -1;
+        }
+    }
+    if (in == NULL) {
+        in = &f->inlets[f->n_inlets++];
+    } else {
+        mhi_inlet_close(in);
+    }
+    *in = fresh;
+    f->guess[in - f->inlets] = INFINITY;
+    return MHE_OK;
+}
+
+mhe_status mhi_feed_begin(mhi_feed *f, mhe_error *err) {
+    static const int32_t kinds[] = {MHE_STREAM_MARKERS, MHE_STREAM_ANGLES};
+    f->driver = -1;
+    for (size_t k = 0; k < 2 && f->driver < 0; k++) {
+        for (int32_t i = 0; i < f->n_inlets && f->driver < 0; i++) {
+            const mhi_inlet *in = &f->inlets[i];
+            f->driver = in->channel >= 0 && in->kind == kinds[k] && in->n_found > 0 ? i : -1;
+        }
+    }
+    f->running = f->driver >= 0;
+    return f->running
+               ? MHE_OK
+               : mhe_fail(err, MHE_E_INPUT, "no stream has a marker or a joint angle of the model");
+}
+
+/* ---- electrodes: frames get their EMG when it is there ---- */
+
+static void keep_waiting(mhi_feed *f, double time) {
+    if (f->n_waiting == WAITING) {
+        f->first_waiting = (f->first_waiting + 1) % WAITING;
+        f->n_waiting--;
+    }
+    f->waiting[(f->first_waiting + f->n_waiting++) % WAITING] = time;
+}
+
+static mhe_status serve_waiting(mhi_feed *f, mhi_inlet *in, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    while (f->n_waiting > 0 && f->waiting[f->first_waiting] <= in->newest && status == MHE_OK) {
+        const double time = f->waiting[f->first_waiting];
+        mhi_electrodes_at(in->electrodes, time, in->row);
+        status = mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
+        f->first_waiting = (f->first_waiting + 1) % WAITING;
+        f->n_waiting--;
+    }
+    return status;
+}
+
+/* The frame's own EMG where it is there already. */
+static void add_electrodes(mhi_feed *f, double time) {
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        mhi_inlet *in = &f->inlets[i];
+        if (in->is_raw && in->channel >= 0) {
+            if (in->newest >= time) {
+                mhi_electrodes_at(in->electrodes, time, in->row);
+                f->channels[in->channel] = in->row;
+            } else {
+                keep_waiting(f, time);
+            }
+        }
+    }
+}
+
+/* ---- samples ---- */
+
+static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, mhe_error *err) {
+    mhe_estimate estimate = {.size = sizeof estimate};
+    mhe_error why = {0};
+    int32_t ready = 0;
+    memset(f->channels, 0, sizeof *f->channels * (size_t)f->info.n_channels);
+    f->channels[in->channel] = in->row;
+    add_electrodes(f, time);
+    const mhe_frame frame = {.size = sizeof frame,
+                             .time = time,
+                             .n_channels = f->info.n_channels,
+                             .channels = f->channels};
+    f->n_frames++;
+    const mhe_status status = mhe_estimator_push(f->estimator, &frame, &estimate, &ready, &why);
+    if (status == MHE_E_ARGUMENT) { /* its time does not follow */
+        f->n_out_of_order++;
+        return MHE_OK;
+    }
+    if (status == MHE_E_INPUT) { /* this window cannot begin; the next may */
+        if (f->n_restarts++ == 0) {
+            warn(f, why.text);
+        }
+        return MHE_OK;
+    }
+    if (status != MHE_OK) {
+        return mhe_fail(err, status, "%s", why.text);
+    }
+    f->last = time;
+    if (ready) {
+        f->n_estimates++;
+        f->n_by_status[estimate.status >= 0 && estimate.status < 8 ? estimate.status : 7]++;
+        if (f->taker != NULL) {
+            f->taker(f->data, &estimate, f->start + estimate.time);
+        }
+    }
+    return MHE_OK;
+}
+
+static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, const double *values,
+                              mhe_error *err) {
+    const int32_t is_driver = in == &f->inlets[f->driver];
+    const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
+    if (f->n_frames == 0 && is_driver) {
+        f->start = smooth;
+    }
+    if (f->n_frames == 0 && !is_driver) {
+        in->newest = -INFINITY; /* before the first frame there is no time to give it */
+        return MHE_OK;
+    }
+    const double time = smooth - f->start;
+    in->n_samples++;
+    in->newest = time;
+    if (in->is_raw) {
+        mhi_electrodes_push(in->electrodes, time, values);
+        return MHE_OK;
+    }
+    mhi_inlet_take(in, f->setup.run, values);
+    return is_driver ? push_frame(f, in, time, err)
+                     : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
+}
+
+/* What to add to stamps. Where it was never measured: samples are never early, so the least delay
+ * seen is taken for none. */
+static double offset_of(mhi_feed *f, const mhi_inlet *in, const mhi_packet *p) {
+    double *guess = &f->guess[in - f->inlets];
+    if (isfinite(p->offset)) {
+        return p->offset;
+    }
+    const double least = p->received - p->stamp[p->n - 1];
+    *guess =
+        isfinite(*guess) && fabs(least - *guess) < 5 ? fmin(*guess + FORGET * p->n, least) : least;
+    return *guess;
+}
+
+static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
+    mhi_inlet *in = mhi_feed_inlet(f, p->source, p->stream);
+    if (in == NULL || in->channel < 0 || p->n_channels != in->n_channels || !f->running) {
+        return MHE_OK;
+    }
+    in->lost = 0;
+    const double offset = p->stamp == NULL ? 0 : offset_of(f, in, p);
+    const double period = in->rate > 0 ? 1 / in->rate : 0;
+    mhe_status status = MHE_OK;
+    for (int32_t k = 0; k < p->n && status == MHE_OK; k++) {
+        const double time =
+            p->stamp == NULL ? p->received - (p->n - 1 - k) * period : p->stamp[k] + offset;
+        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, err);
+    }
+    return status == MHE_OK && in->is_raw ? serve_waiting(f, in, err) : status;
+}
+
+static void take_event(mhi_feed *f, const mhi_packet *p) {
+    const int lost = p->event == MHE_SOURCE_LOST, back = p->event == MHE_SOURCE_BACK;
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        mhi_inlet *in = &f->inlets[i];
+        if (in->source == p->source && (p->stream < 0 || p->stream == in->stream)) {
+            in->lost = lost ? 1 : back ? 0 : in->lost;
+        }
+    }
+    f->setup.host->log(f->setup.host, back ? MHE_LOG_INFO : MHE_LOG_WARNING,
+                       p->text == NULL ? "an event of a source" : p->text);
+}
+
+mhe_status mhi_feed_take(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
+    if (p->kind == MHI_PACKET_STREAM) {
+        return take_stream(f, p, err);
+    }
+    if (p->kind == MHI_PACKET_EVENT) {
+        if (p->event != MHE_SOURCE_ENDED) {
+            take_event(f, p);
+        }
+        return MHE_OK;
+    }
+    return take_samples(f, p, err);
+}

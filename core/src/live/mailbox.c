@@ -1,0 +1,185 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mailbox.c: packets and the queue between sources and the estimator's thread. */
+#include "live/intake.h"
+
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+struct mhi_mailbox {
+    pthread_mutex_t mutex;
+    pthread_cond_t filled; /* on CLOCK_MONOTONIC */
+    mhi_packet *first, *last;
+    int32_t n, woken;
+};
+
+static void free_stream(mhi_stream *s) {
+    for (int32_t i = 0; s != NULL && i < s->n_channels; i++) {
+        free(s->labels == NULL ? NULL : s->labels[i]);
+        free(s->units == NULL ? NULL : s->units[i]);
+    }
+    if (s != NULL) {
+        free(s->labels);
+        free(s->units);
+        free(s->name);
+        free(s);
+    }
+}
+
+void mhi_packet_free(mhi_packet *p) {
+    if (p != NULL) {
+        free_stream(p->about);
+        free(p->stamp);
+        free(p->values);
+        free(p->text);
+        free(p);
+    }
+}
+
+static mhi_packet *new_packet(int32_t kind, int32_t source, int32_t stream) {
+    mhi_packet *p = calloc(1, sizeof *p);
+    if (p != NULL) {
+        p->kind = kind;
+        p->source = source;
+        p->stream = stream;
+        p->offset = NAN;
+    }
+    return p;
+}
+
+static char *copy(const char *text) {
+    return strdup(text == NULL ? "" : text);
+}
+
+mhi_packet *mhi_packet_stream(int32_t source, int32_t stream, const mhe_stream_info *info) {
+    mhi_packet *p = new_packet(MHI_PACKET_STREAM, source, stream);
+    mhi_stream *s = calloc(1, sizeof *s);
+    if (p == NULL || s == NULL) {
+        free(s);
+        mhi_packet_free(p);
+        return NULL;
+    }
+    p->about = s;
+    s->kind = info->kind;
+    s->n_channels = info->n_channels;
+    s->up = info->up;
+    s->rate = info->rate;
+    s->name = copy(info->name);
+    s->labels = calloc((size_t)info->n_channels + 1, sizeof *s->labels);
+    s->units = calloc((size_t)info->n_channels + 1, sizeof *s->units);
+    int whole = s->name != NULL && s->labels != NULL && s->units != NULL;
+    for (int32_t i = 0; i < info->n_channels && whole; i++) {
+        s->labels[i] = copy(info->labels[i]);
+        s->units[i] = copy(info->units == NULL ? NULL : info->units[i]);
+        whole = s->labels[i] != NULL && s->units[i] != NULL;
+    }
+    if (!whole) {
+        mhi_packet_free(p);
+        return NULL;
+    }
+    return p;
+}
+
+mhi_packet *mhi_packet_samples(int32_t source, int32_t n_channels, const mhe_chunk *chunk) {
+    mhi_packet *p = new_packet(MHI_PACKET_SAMPLES, source, chunk->stream);
+    if (p == NULL) {
+        return NULL;
+    }
+    const size_t n = (size_t)chunk->n, numbers = n * (size_t)n_channels;
+    p->n = chunk->n;
+    p->n_channels = n_channels;
+    p->received = chunk->received;
+    p->stamp = chunk->stamp == NULL ? NULL : malloc(sizeof(double) * (n + 1));
+    p->values = malloc(sizeof(double) * (numbers + 1));
+    if (p->values == NULL || (chunk->stamp != NULL && p->stamp == NULL)) {
+        mhi_packet_free(p);
+        return NULL;
+    }
+    if (chunk->stamp != NULL) {
+        memcpy(p->stamp, chunk->stamp, sizeof(double) * n);
+    }
+    memcpy(p->values, chunk->values, sizeof(double) * numbers);
+    return p;
+}
+
+mhi_packet *mhi_packet_event(int32_t source, int32_t event, int32_t stream, const char *text) {
+    mhi_packet *p = new_packet(MHI_PACKET_EVENT, source, stream);
+    if (p != NULL) {
+        p->event = event;
+        p->text = copy(text);
+    }
+    return p;
+}
+
+mhi_mailbox *mhi_mailbox_create(void) {
+    mhi_mailbox *box = calloc(1, sizeof *box);
+    pthread_condattr_t attributes;
+    if (box != NULL) {
+        (void)pthread_mutex_init(&box->mutex, NULL);
+        (void)pthread_condattr_init(&attributes);
+        (void)pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
+        (void)pthread_cond_init(&box->filled, &attributes);
+        (void)pthread_condattr_destroy(&attributes);
+    }
+    return box;
+}
+
+void mhi_mailbox_free(mhi_mailbox *box) {
+    if (box == NULL) {
+        return;
+    }
+    while (box->first != NULL) {
+        mhi_packet *p = box->first;
+        box->first = p->next;
+        mhi_packet_free(p);
+    }
+    (void)pthread_cond_destroy(&box->filled);
+    (void)pthread_mutex_destroy(&box->mutex);
+    free(box);
+}
+
+void mhi_mailbox_put(mhi_mailbox *box, mhi_packet *packet) {
+    if (packet == NULL) {
+        return;
+    }
+    (void)pthread_mutex_lock(&box->mutex);
+    packet->next = NULL;
+    *(box->first == NULL ? &box->first : &box->last->next) = packet;
+    box->last = packet;
+    box->n++;
+    (void)pthread_cond_signal(&box->filled);
+    (void)pthread_mutex_unlock(&box->mutex);
+}
+
+mhi_packet *mhi_mailbox_take(mhi_mailbox *box, double deadline) {
+    const struct timespec until = {(time_t)deadline, (long)(1e9 * (deadline - floor(deadline)))};
+    int code = 0;
+    (void)pthread_mutex_lock(&box->mutex);
+    while (box->first == NULL && !box->woken && code == 0) {
+        code = pthread_cond_timedwait(&box->filled, &box->mutex, &until);
+    }
+    box->woken = 0;
+    mhi_packet *p = box->first;
+    if (p != NULL) {
+        box->first = p->next;
+        box->n--;
+    }
+    (void)pthread_mutex_unlock(&box->mutex);
+    return p;
+}
+
+int32_t mhi_mailbox_waiting(mhi_mailbox *box) {
+    (void)pthread_mutex_lock(&box->mutex);
+    const int32_t n = box->n;
+    (void)pthread_mutex_unlock(&box->mutex);
+    return n;
+}
+
+void mhi_mailbox_wake(mhi_mailbox *box) {
+    (void)pthread_mutex_lock(&box->mutex);
+    box->woken = 1;
+    (void)pthread_cond_signal(&box->filled);
+    (void)pthread_mutex_unlock(&box->mutex);
+}

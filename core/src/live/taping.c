@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "live/taping.h"
+
+#include "live/recorded.h"
+#include "live/xdf_write.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* A stream of a source, and its number in the file. */
+typedef struct entry {
+    int32_t source, stream, n_channels;
+    uint32_t id;
+    int64_t n_taken;
+} entry;
+
+struct mhi_taping {
+    mhi_xdf_writer *writer;
+    char *path;
+    uint32_t arrivals, frames;
+    int32_t n_entries;
+    entry entries[2 * MHI_FEED_INLETS];
+    double *stamps; /* [room] of samples that have none */
+    int32_t room;
+};
+
+static const mhi_xdf_column arrival_columns[MHI_ARRIVAL_COLUMNS] = {{"stream", "1", NULL, NULL},
+                                                                    {"samples", "1", NULL, NULL},
+                                                                    {"received", "s", NULL, NULL},
+                                                                    {"offset", "s", NULL, NULL},
+                                                                    {"stamped", "1", NULL, NULL}};
+static const mhi_xdf_column frame_columns[MHI_FRAME_COLUMNS] = {
+    {"time", "s", NULL, NULL}, {"status", "1", NULL, NULL}, {"iterations", "1", NULL, NULL}};
+
+mhe_status mhi_taping_open(const char *path, const char *title, mhi_taping **record,
+                           mhe_error *err) {
+    *record = NULL;
+    mhi_taping *r = calloc(1, sizeof *r);
+    if (r == NULL || (r->path = strdup(path)) == NULL) {
+        free(r);
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhe_status status = mhi_xdf_create(path, &r->writer, err);
+    if (status == MHE_OK) {
+        status = mhi_xdf_add_stream(r->writer, title, MHI_ARRIVALS, 0, arrival_columns,
+                                    MHI_ARRIVAL_COLUMNS, NULL, &r->arrivals, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_xdf_add_stream(r->writer, title, MHI_FRAMES, 0, frame_columns,
+                                    MHI_FRAME_COLUMNS, NULL, &r->frames, err);
+    }
+    if (status != MHE_OK) {
+        (void)mhi_taping_close(r, NULL);
+        return status;
+    }
+    *record = r;
+    return MHE_OK;
+}
+
+static entry *find(mhi_taping *r, const mhi_packet *p) {
+    for (int32_t i = r->n_entries; i-- > 0;) { /* the newest description counts */
+        if (r->entries[i].source == p->source && r->entries[i].stream == p->stream) {
+            return &r->entries[i];
+        }
+    }
+    return NULL;
+}
+
+/* Markers keep their axes as the community describes them. */
+static mhe_status add_stream(mhi_taping *r, const mhi_packet *p, mhe_error *err) {
+    static const char *const types[] = {"", "MoCap", "EMG", "Angles"};
+    static const char *const axes[] = {"PositionX", "PositionY", "PositionZ"};
+    const mhi_stream *s = p->about;
+    if (r->n_entries == 2 * MHI_FEED_INLETS) {
+        return MHE_OK;
+    }
+    mhi_xdf_column *columns = calloc((size_t)s->n_channels + 1, sizeof *columns);
+    if (columns == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < s->n_channels; i++) {
+        columns[i].label = s->labels[i];
+        columns[i].unit = s->units[i];
+        columns[i].type = s->kind == MHE_STREAM_MARKERS ? axes[i % 3] : NULL;
+    }
+    entry *e = &r->entries[r->n_entries++];
+    *e = (entry){p->source, p->stream, s->n_channels, 0, 0};
+    const mhe_status status = mhi_xdf_add_stream(r->writer, s->name, types[s->kind & 3], s->rate,
+                                                 columns, s->n_channels, NULL, &e->id, err);
+    free(columns);
+    return status;
+}
+
+static mhe_status add_samples(mhi_taping *r, const mhi_packet *p, mhe_error *err) {
+    entry *e = find(r, p);
+    if (e == NULL || e->n_channels != p->n_channels) {
+        return MHE_OK;
+    }
+    const double *stamps = p->stamp;
+    if (stamps == NULL && p->n > r->room) {
+        double *grown = realloc(r->stamps, sizeof *grown * (size_t)p->n);
+        if (grown == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+        r->stamps = grown;
+        r->room = p->n;
+    }
+    for (int32_t k = 0; k < p->n && stamps == NULL; k++) {
+        r->stamps[k] = p->received;
+    }
+    const double row[MHI_ARRIVAL_COLUMNS] = {e->id, p->n, p->received, p->offset, stamps != NULL};
+    mhe_status status = mhi_xdf_put(r->writer, e->id, p->n_channels, p->n,
+                                    stamps == NULL ? r->stamps : stamps, p->values, err);
+    if (status == MHE_OK && stamps != NULL && isfinite(p->offset) && e->n_taken % 500 == 0) {
+        status = mhi_xdf_put_offset(r->writer, e->id, stamps[0], p->offset, err);
+    }
+    e->n_taken += p->n;
+    if (status == MHE_OK) {
+        status =
+            mhi_xdf_put(r->writer, r->arrivals, MHI_ARRIVAL_COLUMNS, 1, &p->received, row, err);
+    }
+    return status;
+}
+
+mhe_status mhi_taping_take(mhi_taping *r, const mhi_packet *p, mhe_error *err) {
+    return p->kind == MHI_PACKET_STREAM    ? add_stream(r, p, err)
+           : p->kind == MHI_PACKET_SAMPLES ? add_samples(r, p, err)
+                                           : MHE_OK;
+}
+
+mhe_status mhi_taping_frame(mhi_taping *r, const mhe_estimate *estimate, double host_time,
+                            mhe_error *err) {
+    const double row[MHI_FRAME_COLUMNS] = {estimate->time, estimate->status, estimate->iterations};
+    return mhi_xdf_put(r->writer, r->frames, MHI_FRAME_COLUMNS, 1, &host_time, row, err);
+}
+
+const char *mhi_taping_path(const mhi_taping *r) {
+    return r->path;
+}
+
+mhe_status mhi_taping_close(mhi_taping *r, mhe_error *err) {
+    if (r == NULL) {
+        return MHE_OK;
+    }
+    const mhe_status status = mhi_xdf_close(r->writer, err);
+    free(r->stamps);
+    free(r->path);
+    free(r);
+    return status;
+}

@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* source_lsl.c: samples of the streams as they come, and their senders' clocks. */
+#include "source_lsl.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define QUIET 1.0       /* s without a sample of a regular stream: told as lost */
+#define CLOCK_EVERY 2.0 /* s between two looks at a sender's clock */
+#define WAIT 0.001      /* s of one pull */
+
+double lsl_now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void lsl_source_destroy(void *self) {
+    lsl_source *source = self;
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        lsl_disconnect(source, &source->streams[i]);
+    }
+    free(source->streams);
+    free(source);
+}
+
+static mhe_status lsl_source_create(const mhe_host *host, const void *config, void **self,
+                                    mhe_error *err) {
+    const struct lsl_config *c = config;
+    const mhe_text_list *const lists[] = {&c->markers, &c->emg, &c->angles};
+    static const int32_t kinds[] = {MHE_STREAM_MARKERS, MHE_STREAM_EMG, MHE_STREAM_ANGLES};
+    const int32_t n = c->markers.n + c->emg.n + c->angles.n;
+    if (n == 0) {
+        return mhe_fail(err, MHE_E_CONFIG,
+                        "no stream is asked for: give markers, emg or angles, as in markers: "
+                        "[type='MoCap']");
+    }
+    lsl_source *source = calloc(1, sizeof *source);
+    lsl_stream *streams = calloc((size_t)n, sizeof *streams);
+    if (source == NULL || streams == NULL) {
+        free(source);
+        free(streams);
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    source->host = host;
+    source->config = *c;
+    source->streams = streams;
+    for (size_t k = 0; k < 3; k++) {
+        for (int32_t i = 0; i < lists[k]->n; i++) {
+            streams[source->n_streams++] =
+                (lsl_stream){.predicate = lists[k]->values[i], .kind = kinds[k]};
+        }
+    }
+    const mhe_status status = lsl_load(c->library, &source->lsl, err);
+    if (status != MHE_OK) {
+        free(streams);
+        free(source);
+        return status;
+    }
+    source->clock = lsl_now() - source->lsl.local_clock();
+    *self = source;
+    return MHE_OK;
+}
+
+static mhe_status lsl_source_open(void *self, double deadline, mhe_error *err) {
+    lsl_source *source = self;
+    mhe_status first = MHE_OK;
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        mhe_error why = {0};
+        lsl_stream *s = &source->streams[i];
+        const mhe_status status =
+            s->inlet != NULL ? MHE_OK : lsl_connect(source, s, deadline, &why);
+        if (status != MHE_OK && (first == MHE_OK || status < first)) {
+            first = mhe_fail(err, status, "%s", why.text);
+        }
+    }
+    return first;
+}
+
+static int32_t lsl_source_count(const void *self) {
+    return ((const lsl_source *)self)->n_streams;
+}
+
+static mhe_status lsl_source_stream(const void *self, int32_t i, mhe_stream_info *out,
+                                    mhe_error *err) {
+    const lsl_source *source = self;
+    if (i < 0 || i >= source->n_streams || source->streams[i].inlet == NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "stream %d is not there", (int)i);
+    }
+    const lsl_stream *s = &source->streams[i];
+    *out = (mhe_stream_info){.size = out->size,
+                             .kind = s->kind,
+                             .name = s->name,
+                             .n_channels = s->n_channels,
+                             .labels = (const char *const *)s->labels,
+                             .units = (const char *const *)s->units,
+                             .rate = s->rate,
+                             .up = -1};
+    return MHE_OK;
+}
+
+static void tell(const mhe_source_taker *taker, int32_t event, int32_t i, const lsl_stream *s,
+                 const char *what) {
+    char text[256];
+    (void)snprintf(text, sizeof text, "stream '%.120s' %s", s->name, what);
+    taker->event(taker->data, event, i, text);
+}
+
+/* Has a sender that came back other channels or labels? The library reconnects by itself to a
+ * sender of the same source id; its description may be another then. */
+static mhe_status reopen(lsl_source *source, int32_t i, const mhe_source_taker *taker,
+                         mhe_error *err) {
+    lsl_stream fresh = {.predicate = source->streams[i].predicate, .kind = source->streams[i].kind};
+    lsl_stream *s = &source->streams[i];
+    const mhe_status status = lsl_connect(source, &fresh, lsl_now() + 0.05, err);
+    if (status != MHE_OK) {
+        return status > 0 ? MHE_OK : status;
+    }
+    int same = fresh.n_channels == s->n_channels && fresh.rate == s->rate;
+    for (int32_t k = 0; k < fresh.n_channels && same; k++) {
+        same = strcmp(fresh.labels[k], s->labels[k]) == 0;
+    }
+    lsl_disconnect(source, s);
+    *s = fresh;
+    tell(taker, same ? MHE_SOURCE_BACK : MHE_SOURCE_CHANGED, i, s,
+         same ? "is back" : "is back with other channels");
+    return MHE_OK;
+}
+
+/* Samples that are there, at most one pull; returns how many. */
+static int32_t pull(lsl_source *source, int32_t i, double wait, const mhe_source_taker *taker) {
+    lsl_stream *s = &source->streams[i];
+    int32_t code = 0;
+    const unsigned long elements =
+        source->lsl.pull_chunk_d(s->inlet, s->values, s->stamps,
+                                 s->room * (unsigned long)s->n_channels, s->room, wait, &code);
+    const int32_t n = (int32_t)(elements / (unsigned long)s->n_channels);
+    if (n > 0) {
+        const mhe_chunk chunk = {.size = sizeof chunk,
+                                 .stream = i,
+                                 .n = n,
+                                 .received = lsl_now(),
+                                 .stamp = s->stamps,
+                                 .values = s->values};
+        s->newest = chunk.received;
+        if (s->lost) {
+            s->lost = 0;
+            tell(taker, MHE_SOURCE_BACK, i, s, "is back");
+        }
+        taker->chunk(taker->data, &chunk);
+    }
+    return n;
+}
+
+static mhe_status watch(lsl_source *source, int32_t i, const mhe_source_taker *taker,
+                        mhe_error *err) {
+    lsl_stream *s = &source->streams[i];
+    const double now = lsl_now();
+    if (!s->lost && s->rate > 0 && now - s->newest > QUIET) {
+        s->lost = 1;
+        tell(taker, MHE_SOURCE_LOST, i, s, "sends nothing any more");
+    }
+    if (s->lost && now - s->newest > 2 * QUIET) {
+        s->newest = now - QUIET; /* the next look is in a second */
+        return reopen(source, i, taker, err);
+    }
+    return MHE_OK;
+}
+
+static mhe_status lsl_source_read(void *self, double deadline, const mhe_source_taker *taker,
+                                  mhe_error *err) {
+    lsl_source *source = self;
+    mhe_status status = MHE_OK;
+    int32_t n = 0;
+    do {
+        for (int32_t i = 0; i < source->n_streams && status == MHE_OK; i++) {
+            /* the first stream waits for all: pulls with a timeout return as soon as one sample is
+             * there */
+            const double wait = n == 0 && i == 0 ? WAIT : 0;
+            n += pull(source, i, wait, taker);
+            status = watch(source, i, taker, err);
+        }
+    } while (n == 0 && status == MHE_OK && lsl_now() < deadline);
+    return status;
+}
+
+static mhe_status lsl_source_clock_offset(void *self, int32_t i, double *offset, mhe_error *err) {
+    lsl_source *source = self;
+    lsl_stream *s = &source->streams[i];
+    const double now = lsl_now();
+    int32_t code = 0;
+    if (s->inlet != NULL && (!s->has_offset || now - s->asked > CLOCK_EVERY)) {
+        /* the first takes a packet to and fro; later ones are measured in the background */
+        const double measured =
+            source->lsl.time_correction(s->inlet, s->has_offset ? 0.0 : 1.0, &code);
+        s->asked = now;
+        if (code == lsl_no_error && isfinite(measured)) {
+            s->offset = measured;
+            s->has_offset = 1;
+        }
+    }
+    *offset = s->offset + source->clock;
+    return s->has_offset ? MHE_OK : mhe_fail(err, MHE_RETRY, "the sender's clock is not known yet");
+}
+
+static const mhe_source_ops lsl_ops = {.size = sizeof lsl_ops,
+                                       .create = lsl_source_create,
+                                       .destroy = lsl_source_destroy,
+                                       .open = lsl_source_open,
+                                       .count = lsl_source_count,
+                                       .stream = lsl_source_stream,
+                                       .read = lsl_source_read,
+                                       .clock_offset = lsl_source_clock_offset};
+
+static const mhe_option lsl_options[] = {
+    MHE_OPT_TEXTS(struct lsl_config, markers, 0,
+                  "Streams of markers, each by what its description must fulfil (XPath), as "
+                  "type='MoCap' or name='QTM'."),
+    MHE_OPT_TEXTS(struct lsl_config, emg, 0, "Streams of EMG, as type='EMG'."),
+    MHE_OPT_TEXTS(struct lsl_config, angles, 0, "Streams of joint angles, rad."),
+    MHE_OPT_PATH(struct lsl_config, library, MHE_OPT_ADVANCED,
+                 "The library's file; without: the system's, else the one beside the plugin."),
+    MHE_OPT_REAL(struct lsl_config, buffer, 10, 1, 3600, "s",
+                 "What the library keeps while nobody reads."),
+};
+
+static const mhe_plugin lsl_plugin = {.size = sizeof lsl_plugin,
+                                      .id = "mhe.source.lsl",
+                                      .version = "0.2.0",
+                                      .summary = "Streams of the Lab Streaming Layer.",
+                                      .reference =
+                                          "Kothe et al. 2024, doi:10.1101/2024.02.13.580071",
+                                      .iface = MHE_SOURCE_IFACE,
+                                      .ops = &lsl_ops,
+                                      MHE_PLUGIN_OPTIONS(struct lsl_config, lsl_options)};
+
+MHE_PLUGIN_LIBRARY(&lsl_plugin)

@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* source_lsl.h: streams of the Lab Streaming Layer as a source. */
+#ifndef SOURCE_LSL_H
+#define SOURCE_LSL_H
+
+#include "../lsl_library.h"
+
+#include <mhe/source.h>
+
+struct lsl_config { /* filled by the core from the option table */
+    const char *library;
+    mhe_text_list markers, emg, angles; /* predicates */
+    double buffer;                      /* s */
+};
+
+/* One stream: what was asked for, and what was found. */
+typedef struct lsl_stream {
+    const char *predicate;
+    int32_t kind;    /* MHE_STREAM_* */
+    lsl_inlet inlet; /* NULL: not found yet */
+    int32_t n_channels, format;
+    double rate;
+    char *name, *uid;
+    char **labels, **units;
+    int32_t lost;
+    double offset; /* s, lsl_time_correction of the inlet */
+    double asked;  /* s, when it was asked for last */
+    int32_t has_offset;
+    double newest;           /* s of CLOCK_MONOTONIC, the last sample's arrival */
+    double *values, *stamps; /* room for one pull */
+    unsigned long room;      /* samples */
+} lsl_stream;
+
+typedef struct lsl_source {
+    const mhe_host *host;
+    struct lsl_config config;
+    lsl_library lsl;
+    double clock; /* CLOCK_MONOTONIC - lsl_local_clock() */
+    int32_t n_streams;
+    lsl_stream *streams;
+} lsl_source;
+
+double lsl_now(void); /* s of CLOCK_MONOTONIC */
+
+/* lsl_connect.c: looks for the stream until `deadline`; MHE_RETRY: not there, or not the only one.
+ */
+mhe_status lsl_connect(lsl_source *source, lsl_stream *stream, double deadline, mhe_error *err);
+void lsl_disconnect(lsl_source *source, lsl_stream *stream);
+
+#endif

@@ -1,0 +1,336 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* source_recording.c: files as if they came from devices: by the clock, faster, or as fast as they
+ * are taken.
+ *
+ * A recording that says how its samples came (ours) is repeated packet by packet, with the stamps,
+ * arrival times and clock offsets that were then, whatever the clock says now. */
+#include <mhe/source.h>
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define MOST_FILES 3
+#define PACKET 64 /* samples at most */
+
+struct recording_config { /* filled by the core from the option table */
+    const char *file, *markers, *emg, *angles;
+    double speed;
+    int32_t loop;
+};
+
+/* A stream of one of the files. */
+typedef struct track {
+    const mhe_recorded_stream *stream;
+    int64_t next;
+} track;
+
+typedef struct recording {
+    struct recording_config config;
+    const mhe_recorded_service *service;
+    const mhe_recorded *files[MOST_FILES];
+    int32_t n_files, n_tracks;
+    track *tracks;
+    const mhe_recorded *arrivals; /* file whose packets are repeated; NULL: none */
+    int64_t next_arrival;
+    double offset; /* of the packet in work: stamps + offset is CLOCK_MONOTONIC; NaN: not known */
+    double first;  /* s, earliest stamp */
+    double begun;  /* s of CLOCK_MONOTONIC at which `first` is due */
+    int32_t started, ended;
+} recording;
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static const mhe_recorded_stream *stream_at(const mhe_recorded *r, int32_t i) {
+    return (const mhe_recorded_stream *)(const void *)((const char *)r->streams +
+                                                       (size_t)i * r->stream_size);
+}
+
+static const mhe_arrival *arrival_at(const mhe_recorded *r, int64_t i) {
+    return (const mhe_arrival *)(const void *)((const char *)r->arrivals +
+                                               (size_t)i * r->arrival_size);
+}
+
+static void recording_destroy(void *self) {
+    recording *s = self;
+    for (int32_t i = 0; i < s->n_files; i++) {
+        s->service->free(s->files[i]);
+    }
+    free(s->tracks);
+    free(s);
+}
+
+static mhe_status read_file(recording *s, const char *path, int32_t kind, mhe_error *err) {
+    if (path == NULL) {
+        return MHE_OK;
+    }
+    const mhe_status status = s->service->read(path, kind, &s->files[s->n_files], err);
+    s->n_files += status == MHE_OK;
+    return status;
+}
+
+static mhe_status lay_tracks(recording *s, mhe_error *err) {
+    int32_t n = 0;
+    for (int32_t i = 0; i < s->n_files; i++) {
+        n += s->files[i]->n_streams;
+    }
+    s->tracks = calloc((size_t)n + 1, sizeof *s->tracks);
+    if (s->tracks == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    s->first = INFINITY;
+    for (int32_t i = 0; i < s->n_files; i++) {
+        for (int32_t k = 0; k < s->files[i]->n_streams; k++) {
+            const mhe_recorded_stream *stream = stream_at(s->files[i], k);
+            s->tracks[s->n_tracks++].stream = stream;
+            s->first = stream->n > 0 ? fmin(s->first, stream->stamp[0]) : s->first;
+        }
+        if (s->n_files == 1 && s->files[i]->n_arrivals > 0) {
+            s->arrivals = s->files[i];
+        }
+    }
+    return MHE_OK;
+}
+
+static mhe_status recording_create(const mhe_host *host, const void *config, void **self,
+                                   mhe_error *err) {
+    const struct recording_config *c = config;
+    recording *s = calloc(1, sizeof *s);
+    if (s == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    s->config = *c;
+    s->service = host->service(host, MHE_RECORDED_SERVICE);
+    if (s->service == NULL) {
+        free(s);
+        return mhe_fail(err, MHE_E_UNSUPPORTED, "this program reads no recordings for sources");
+    }
+    mhe_status status = MHE_OK;
+    if (c->file == NULL && c->markers == NULL && c->emg == NULL && c->angles == NULL) {
+        status =
+            mhe_fail(err, MHE_E_CONFIG, "no file: give `file` (.xdf), or markers, emg, angles");
+    } else if (c->file != NULL && (c->markers != NULL || c->emg != NULL || c->angles != NULL)) {
+        status = mhe_fail(err, MHE_E_CONFIG, "`file` holds all streams; take out the others");
+    }
+    status = status == MHE_OK ? read_file(s, c->file, MHE_STREAM_OTHER, err) : status;
+    status = status == MHE_OK ? read_file(s, c->markers, MHE_STREAM_MARKERS, err) : status;
+    status = status == MHE_OK ? read_file(s, c->emg, MHE_STREAM_EMG, err) : status;
+    status = status == MHE_OK ? read_file(s, c->angles, MHE_STREAM_ANGLES, err) : status;
+    status = status == MHE_OK ? lay_tracks(s, err) : status;
+    if (status != MHE_OK) {
+        recording_destroy(s);
+        return status;
+    }
+    *self = s;
+    return MHE_OK;
+}
+
+static mhe_status recording_open(void *self, double deadline, mhe_error *err) {
+    (void)self, (void)deadline, (void)err;
+    return MHE_OK;
+}
+
+static int32_t recording_count(const void *self) {
+    return ((const recording *)self)->n_tracks;
+}
+
+static mhe_status recording_stream(const void *self, int32_t i, mhe_stream_info *out,
+                                   mhe_error *err) {
+    const recording *s = self;
+    if (i < 0 || i >= s->n_tracks) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "stream %d is not there", (int)i);
+    }
+    const uint32_t size = out->size;
+    *out = s->tracks[i].stream->about;
+    out->size = size;
+    return MHE_OK;
+}
+
+static void sleep_until(double seconds, double deadline) {
+    const double until = fmin(seconds, deadline);
+    const struct timespec t = {(time_t)until, (long)(1e9 * (until - floor(until)))};
+    (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &t, NULL);
+}
+
+static void end(recording *s, const mhe_source_taker *taker) {
+    s->ended = 1;
+    taker->event(taker->data, MHE_SOURCE_ENDED, -1, "the recording has ended");
+}
+
+/* ---- packets as they came ---- */
+
+static void repeat(recording *s, double deadline, const mhe_source_taker *taker) {
+    while (!s->ended && (s->config.speed == 0 || now() < deadline)) {
+        if (s->next_arrival == s->arrivals->n_arrivals) {
+            end(s, taker);
+            return;
+        }
+        const mhe_arrival *a = arrival_at(s->arrivals, s->next_arrival);
+        track *t = &s->tracks[a->stream];
+        if (t->next + a->n > t->stream->n) {
+            end(s, taker); /* the recorder was killed within a packet */
+            return;
+        }
+        if (!s->started) {
+            s->started = 1;
+            s->begun = now();
+            s->first = a->received;
+        }
+        if (s->config.speed > 0) {
+            const double due = s->begun + (a->received - s->first) / s->config.speed;
+            if (now() < due) {
+                sleep_until(due, deadline);
+                if (now() < due) {
+                    return;
+                }
+            }
+        }
+        const mhe_chunk chunk = {.size = sizeof chunk,
+                                 .stream = a->stream,
+                                 .n = a->n,
+                                 .received = a->received,
+                                 .stamp = a->has_stamp ? t->stream->stamp + t->next : NULL,
+                                 .values =
+                                     t->stream->values + t->next * t->stream->about.n_channels};
+        s->offset = a->offset;
+        t->next += a->n;
+        s->next_arrival++;
+        taker->chunk(taker->data, &chunk);
+    }
+}
+
+/* ---- samples by their times ---- */
+
+/* Track whose next sample is the earliest; -1: none is left. */
+static int32_t earliest(const recording *s, double *stamp) {
+    int32_t best = -1;
+    *stamp = INFINITY;
+    for (int32_t i = 0; i < s->n_tracks; i++) {
+        const track *t = &s->tracks[i];
+        if (t->next < t->stream->n && t->stream->stamp[t->next] < *stamp) {
+            *stamp = t->stream->stamp[t->next];
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* Samples of a track that are due by `until` (stamps), before any other track's next one. */
+static int32_t count_due(const recording *s, int32_t i, double until) {
+    const track *t = &s->tracks[i];
+    double others = INFINITY;
+    for (int32_t k = 0; k < s->n_tracks; k++) {
+        const track *o = &s->tracks[k];
+        if (k != i && o->next < o->stream->n) {
+            others = fmin(others, o->stream->stamp[o->next]);
+        }
+    }
+    int32_t n = 1;
+    while (n < PACKET && t->next + n < t->stream->n &&
+           t->stream->stamp[t->next + n] <= fmin(until, others)) {
+        n++;
+    }
+    return n;
+}
+
+static void play(recording *s, double deadline, const mhe_source_taker *taker) {
+    const double speed = s->config.speed;
+    if (!s->started) {
+        s->started = 1;
+        s->begun = now();
+    }
+    while (!s->ended && (speed == 0 || now() < deadline)) {
+        double stamp;
+        const int32_t i = earliest(s, &stamp);
+        if (i < 0 && s->config.loop && speed > 0) {
+            for (int32_t k = 0; k < s->n_tracks; k++) {
+                s->tracks[k].next = 0;
+            }
+            s->begun = now() + 10; /* a gap in time: the window begins anew */
+            taker->event(taker->data, MHE_SOURCE_WARNING, -1, "the recording begins again");
+            s->begun = now();
+            continue;
+        }
+        if (i < 0) {
+            end(s, taker);
+            return;
+        }
+        const double due = speed > 0 ? s->begun + (stamp - s->first) / speed : 0;
+        if (now() < due) {
+            sleep_until(due, deadline);
+            if (now() < due) {
+                return;
+            }
+        }
+        track *t = &s->tracks[i];
+        const double until = speed > 0 ? s->first + (now() - s->begun) * speed : INFINITY;
+        const int32_t n = count_due(s, i, until);
+        /* at another speed the stamps are those of the recording, and run with it */
+        s->offset = speed > 0 ? s->begun - s->first : 0;
+        const mhe_chunk chunk = {.size = sizeof chunk,
+                                 .stream = i,
+                                 .n = n,
+                                 .received = now(),
+                                 .stamp = t->stream->stamp + t->next,
+                                 .values =
+                                     t->stream->values + t->next * t->stream->about.n_channels};
+        t->next += n;
+        taker->chunk(taker->data, &chunk);
+    }
+}
+
+static mhe_status recording_read(void *self, double deadline, const mhe_source_taker *taker,
+                                 mhe_error *err) {
+    (void)err;
+    recording *s = self;
+    if (s->ended) {
+        sleep_until(deadline, deadline);
+    } else {
+        (s->arrivals != NULL ? repeat : play)(s, deadline, taker);
+    }
+    return MHE_OK;
+}
+
+static mhe_status recording_clock_offset(void *self, int32_t i, double *offset, mhe_error *err) {
+    (void)i;
+    const recording *s = self;
+    *offset = s->offset;
+    return isfinite(s->offset) ? MHE_OK : mhe_fail(err, MHE_RETRY, "it was not known");
+}
+
+static const mhe_source_ops recording_ops = {.size = sizeof recording_ops,
+                                             .create = recording_create,
+                                             .destroy = recording_destroy,
+                                             .open = recording_open,
+                                             .count = recording_count,
+                                             .stream = recording_stream,
+                                             .read = recording_read,
+                                             .clock_offset = recording_clock_offset};
+
+static const mhe_option recording_options[] = {
+    MHE_OPT_PATH(struct recording_config, file, 0,
+                 "A recording with all streams (.xdf): of mhe-live, repeated as it came, or of "
+                 "LabRecorder."),
+    MHE_OPT_PATH(struct recording_config, markers, 0, "Markers, .trc or .c3d."),
+    MHE_OPT_PATH(struct recording_config, emg, 0, "EMG, .sto, .mot or .c3d (analog)."),
+    MHE_OPT_PATH(struct recording_config, angles, 0, "Joint angles, .sto or .mot."),
+    MHE_OPT_REAL(struct recording_config, speed, 1, 0, 1000, "1",
+                 "1: by the clock; 2: twice as fast; 0: as fast as it is taken."),
+    MHE_OPT_BOOL(struct recording_config, loop, 0, "Begin again at the end."),
+};
+
+static const mhe_plugin recording_plugin = {
+    .size = sizeof recording_plugin,
+    .id = "mhe.source.recording",
+    .version = "0.2.0",
+    .summary = "Recorded files as if they came from devices.",
+    .iface = MHE_SOURCE_IFACE,
+    .ops = &recording_ops,
+    MHE_PLUGIN_OPTIONS(struct recording_config, recording_options)};
+
+MHE_PLUGIN_LIBRARY(&recording_plugin)
