@@ -1,30 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mhe-live: estimates from streams as they come, and hands them on. */
 #include "console.h"
+#include "words.h"
 
 #include <mhe/library.h>
 #include <mhe/live.h>
-#include <mhe/version.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-
-static const char help[] =
-    "usage: mhe-live CONFIG.yaml [options]\n"
-    "Estimates joint angles, activations and muscle forces from live streams. The config is that "
-    "of\n"
-    "mhe-run with two more sections: `sources`, where data come from, and `sinks`, where "
-    "estimates\n"
-    "go. Ctrl-C ends the run; its summary is printed as JSON.\n"
-    "  --set PATH.KEY=VALUE  change a value of the config; may be repeated\n"
-    "  --record FILE.xdf     record everything that comes, so that the run can be repeated\n"
-    "  --for SECONDS         end after so many seconds of estimates\n"
-    "  --wait SECONDS        give up when the streams are not there by then\n"
-    "  --out DIR             folder for recordings and maximal contractions (default: .)\n"
-    "  --quiet               no summary\n"
-    "  --help, --version\n";
 
 static mhe_live *running; /* for the signal handler; set before it is installed */
 
@@ -33,52 +18,81 @@ static void on_signal(int number) {
     mhe_live_stop(running);
 }
 
-typedef struct words {
+typedef struct arguments {
     const char *config, *record, *out;
-    const char **set;
-    int32_t n_set, quiet;
+    words_list set, others;
+    int32_t mode, quiet, trust;
     double seconds, wait;
-} words;
+} arguments;
 
-static mhe_status number(const char *option, const char *text, double *value, mhe_error *err) {
+static mhe_status read_seconds(const char *word, const char *value, void *target, mhe_error *err) {
+    double *seconds = target;
     char *rest = NULL;
-    *value = strtod(text, &rest);
-    return rest != text && *rest == '\0' && *value > 0
+    *seconds = strtod(value, &rest);
+    return rest != value && *rest == '\0' && *seconds > 0 && *seconds < 1e9
                ? MHE_OK
-               : mhe_fail(err, MHE_E_ARGUMENT, "%s %s: a number of seconds above 0 is needed",
-                          option, text);
+               : mhe_fail(err, MHE_E_ARGUMENT, "%s %s: a number of seconds above 0 is needed", word,
+                          value);
 }
 
-static mhe_status parse(int argc, char **argv, words *w, mhe_error *err) {
-    static const char *const options[] = {"--set", "--record", "--for",  "--wait",
-                                          "--out", "--quiet",  "--help", "--version"};
-    const int32_t n = (int32_t)(sizeof options / sizeof *options);
-    mhe_status status = MHE_OK;
-    for (int i = 1; i < argc && status == MHE_OK; i++) {
-        const char *word = argv[i], *value = NULL;
-        if (strcmp(word, "--quiet") == 0) {
-            w->quiet = 1;
-        } else if (strcmp(word, "--set") == 0) {
-            status = console_value(argc, argv, &i, &w->set[w->n_set], err);
-            w->n_set += status == MHE_OK;
-        } else if (strcmp(word, "--record") == 0) {
-            status = console_value(argc, argv, &i, &w->record, err);
-        } else if (strcmp(word, "--out") == 0) {
-            status = console_value(argc, argv, &i, &w->out, err);
-        } else if (strcmp(word, "--for") == 0 || strcmp(word, "--wait") == 0) {
-            status = console_value(argc, argv, &i, &value, err);
-            if (status == MHE_OK) {
-                status = number(word, value, word[2] == 'f' ? &w->seconds : &w->wait, err);
-            }
-        } else {
-            status = console_config(word, options, n, &w->config, err);
-        }
-    }
-    if (status == MHE_OK && w->config == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "a config file is needed: mhe-live CONFIG.yaml");
-    }
-    return status;
-}
+static const words_command commands[] = {
+    {.name = "", .operand = "CONFIG.yaml", .what = "config file", .most = 1}};
+#define AT(field) offsetof(arguments, field)
+
+static const words_option options[] = {
+    {.name = "--set",
+     .value = "path.to.key=value",
+     .help = "replaces a key of the config; may be given often",
+     .kind = WORDS_LIST,
+     .at = AT(set)},
+    {.name = "--record",
+     .value = "FILE.xdf",
+     .help = "records everything that comes, so that the run can be repeated",
+     .kind = WORDS_TEXT,
+     .at = AT(record)},
+    {.name = "--for",
+     .value = "SECONDS",
+     .help = "ends after so many seconds of estimates",
+     .kind = WORDS_OTHER,
+     .at = AT(seconds),
+     .take = read_seconds},
+    {.name = "--wait",
+     .value = "SECONDS",
+     .help = "gives up when the streams are not there by then",
+     .kind = WORDS_OTHER,
+     .at = AT(wait),
+     .take = read_seconds},
+    {.name = "--out",
+     .value = "DIR",
+     .help = "folder of recordings, tables and maximal contractions; this one unless given",
+     .kind = WORDS_TEXT,
+     .at = AT(out)},
+    {.name = "--quiet", .help = "no summary", .kind = WORDS_FLAG, .at = AT(quiet), .low = 1},
+    {.name = "--trust",
+     .help = "the config may name folders of plugins (plugin_path), whose code then runs",
+     .kind = WORDS_FLAG,
+     .at = AT(trust),
+     .low = 1}};
+
+static const words_program program = {
+    .name = "mhe-live",
+    .summary = "Estimates joint angles, activations and muscle forces from live streams.",
+    .usage = "  mhe-live CONFIG.yaml [--record FILE.xdf] [--for SECONDS] [--wait SECONDS] [--out "
+             "DIR]\n"
+             "           [--set path.to.key=value]... [--quiet] [--trust]\n"
+             "  mhe-live --version | --help\n",
+    .notes =
+        "The config is that of mhe-run with two more sections: 'sources', where data come from, "
+        "and\n'sinks', where estimates go. Ctrl-C ends the run; its summary is printed as "
+        "JSON.\nExit status: 0 done; 1 the run failed; 2 the command line, the configuration or "
+        "a file is wrong.\n",
+    .commands = commands,
+    .n_commands = 1,
+    .options = options,
+    .n_options = sizeof options / sizeof options[0],
+    .mode = AT(mode),
+    .operand = AT(config),
+    .others = AT(others)};
 
 static void on_log(const mhe_host *host, int32_t level, const char *text) {
     (void)host;
@@ -105,10 +119,11 @@ static mhe_status print_summary(mhe_live *live, mhe_error *err) {
     return status;
 }
 
-static mhe_status run(const words *w, mhe_error *err) {
+static mhe_status run(const arguments *w, mhe_error *err) {
     const mhe_host host = {.size = sizeof host, .log = on_log, .service = no_service};
     mhe_config *config = NULL;
-    mhe_status status = mhe_config_read(w->config, w->set, w->n_set, &host, &config, err);
+    mhe_status status = mhe_config_read(w->config, w->set.values, w->set.n,
+                                        w->trust ? MHE_CONFIG_TRUST : 0, &host, &config, err);
     if (status == MHE_OK && w->out != NULL && mkdir(w->out, 0777) != 0) {
         struct stat about;
         if (stat(w->out, &about) != 0 || !S_ISDIR(about.st_mode)) {
@@ -137,24 +152,13 @@ static mhe_status run(const words *w, mhe_error *err) {
 }
 
 int main(int argc, char **argv) {
-    words w = {0};
+    arguments a = {0};
     mhe_error err = {0};
-    for (int i = 1; i < argc; i++) {
-        if (strcmp(argv[i], "--help") == 0) {
-            (void)fputs(help, stdout);
-            return 0;
-        }
-        if (strcmp(argv[i], "--version") == 0) {
-            (void)printf("mhe-live %s\n", MHE_VERSION);
-            return 0;
-        }
+    int32_t command = 0, outcome = WORDS_RUN;
+    mhe_status status = words_parse(&program, argc, argv, &a, &command, &outcome, &err);
+    if (status == MHE_OK && outcome == WORDS_RUN) {
+        status = run(&a, &err);
     }
-    w.set = calloc((size_t)argc, sizeof *w.set);
-    mhe_status status =
-        w.set == NULL ? mhe_fail(&err, MHE_E_MEMORY, "out of memory") : parse(argc, argv, &w, &err);
-    if (status == MHE_OK) {
-        status = run(&w, &err);
-    }
-    free((void *)w.set);
+    words_free(&program, &a);
     return console_end("mhe-live", status, &err);
 }

@@ -1,67 +1,91 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mhe-model: what is in a model file, and what the model says at given poses. */
 #include "console.h"
+#include "words.h"
 
 #include <mhe/inspect.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-static const char help[] =
-    "usage: mhe-model info MODEL [--json]\n"
-    "       mhe-model evaluate MODEL --poses FILE.json [--out FILE.json] [--paths exact|fitted]\n"
-    "\n"
-    "info      coordinates, bodies and masses, muscles, wraps, couplers, other forces, markers of\n"
-    "          a .osim or .bioMod file; what is not supported, left out or repaired, with its "
-    "line\n"
-    "evaluate  positions, lengths, moment arms, mass matrix, inverse dynamics, muscle forces and\n"
-    "          joint reactions at the poses of FILE.json (its form: mhe/inspect.h), as JSON\n"
-    "\n"
-    "Exit status: 0 done; 2 the command line or a file is wrong; 1 anything else.\n";
-
-typedef struct words {
+typedef struct arguments {
     const char *model, *poses, *out;
-    int32_t json, paths;
-} words;
+    int32_t mode, json, paths;
+    words_list others;
+} arguments;
 
-static mhe_status read_paths(const char *word, int32_t *paths, mhe_error *err) {
-    if (strcmp(word, "exact") == 0) {
+static mhe_status read_paths(const char *word, const char *value, void *target, mhe_error *err) {
+    int32_t *paths = target;
+    if (strcmp(value, "exact") == 0) {
         *paths = MHE_PATHS_EXACT;
-    } else if (strcmp(word, "fitted") == 0) {
+    } else if (strcmp(value, "fitted") == 0) {
         *paths = MHE_PATHS_FITTED;
     } else {
-        return mhe_fail(err, MHE_E_ARGUMENT, "--paths '%s': exact or fitted", word);
+        return mhe_fail(err, MHE_E_ARGUMENT, "%s '%s': exact or fitted", word, value);
     }
     return MHE_OK;
 }
 
-static mhe_status read_words(int argc, char **argv, int32_t evaluate, words *w, mhe_error *err) {
-    static const char *const of_info[] = {"--json"};
-    static const char *const of_evaluate[] = {"--poses", "--out", "--paths"};
-    mhe_status status = MHE_OK;
-    for (int i = 2; i < argc && status == MHE_OK; i++) {
-        const char *value = NULL;
-        if (!evaluate && strcmp(argv[i], "--json") == 0) {
-            w->json = 1;
-        } else if (evaluate && (strcmp(argv[i], "--poses") == 0 || strcmp(argv[i], "--out") == 0)) {
-            const char **into = argv[i][2] == 'p' ? &w->poses : &w->out;
-            status = console_value(argc, argv, &i, into, err);
-        } else if (evaluate && strcmp(argv[i], "--paths") == 0) {
-            status = console_value(argc, argv, &i, &value, err);
-            status = status == MHE_OK ? read_paths(value, &w->paths, err) : status;
-        } else {
-            status = console_config(argv[i], evaluate ? of_evaluate : of_info, evaluate ? 3 : 1,
-                                    &w->model, err);
-        }
-    }
-    if (status == MHE_OK && w->model == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "which model? mhe-model --help");
-    }
-    if (status == MHE_OK && evaluate && w->poses == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "which poses? --poses FILE.json");
-    }
-    return status;
-}
+static const words_command commands[] = {
+    {.name = "info",
+     .operand = "MODEL",
+     .what = "model file",
+     .help = "coordinates, bodies and masses, muscles, wraps, couplers, other forces, markers of a "
+             ".osim or .bioMod file; what is not supported, left out or repaired, with its line",
+     .most = 1,
+     .missing = "which model? mhe-model --help"},
+    {.name = "evaluate",
+     .operand = "MODEL",
+     .what = "model file",
+     .help = "positions, lengths, moment arms, mass matrix, inverse dynamics, muscle forces and "
+             "joint reactions at the poses of FILE.json (its form: mhe/inspect.h), as JSON",
+     .most = 1,
+     .missing = "which model? mhe-model --help"}};
+#define INFO 1u
+#define EVALUATE 2u
+#define AT(field) offsetof(arguments, field)
+
+static const words_option options[] = {{.name = "--json",
+                                        .help = "info as JSON",
+                                        .commands = INFO,
+                                        .kind = WORDS_FLAG,
+                                        .at = AT(json),
+                                        .low = 1},
+                                       {.name = "--poses",
+                                        .value = "FILE.json",
+                                        .help = "where to evaluate",
+                                        .commands = EVALUATE,
+                                        .kind = WORDS_TEXT,
+                                        .at = AT(poses)},
+                                       {.name = "--out",
+                                        .value = "FILE.json",
+                                        .help = "the answer; stdout unless given",
+                                        .commands = EVALUATE,
+                                        .kind = WORDS_TEXT,
+                                        .at = AT(out)},
+                                       {.name = "--paths",
+                                        .value = "exact|fitted",
+                                        .help = "how lengths of paths are computed",
+                                        .commands = EVALUATE,
+                                        .kind = WORDS_OTHER,
+                                        .at = AT(paths),
+                                        .take = read_paths}};
+
+static const words_program program = {
+    .name = "mhe-model",
+    .summary = "What is in a model file, and what the model says at given poses.",
+    .usage = "  mhe-model info MODEL [--json]\n"
+             "  mhe-model evaluate MODEL --poses FILE.json [--out FILE.json] [--paths "
+             "exact|fitted]\n"
+             "  mhe-model --version | --help\n",
+    .notes = "Exit status: 0 done; 2 the command line or a file is wrong; 1 anything else.\n",
+    .commands = commands,
+    .n_commands = 2,
+    .options = options,
+    .n_options = sizeof options / sizeof options[0],
+    .mode = AT(mode),
+    .operand = AT(model),
+    .others = AT(others)};
 
 /* The whole file; *text is to be freed. */
 static mhe_status slurp(const char *path, char **text, size_t *length, mhe_error *err) {
@@ -102,7 +126,8 @@ static mhe_status give(const char *path, const char *text, mhe_error *err) {
                : MHE_OK;
 }
 
-static mhe_status evaluate(const mhe_host *host, const words *w, char **answer, mhe_error *err) {
+static mhe_status evaluate(const mhe_host *host, const arguments *w, char **answer,
+                           mhe_error *err) {
     char *poses = NULL;
     size_t length = 0;
     mhe_status status = slurp(w->poses, &poses, &length, err);
@@ -113,27 +138,34 @@ static mhe_status evaluate(const mhe_host *host, const words *w, char **answer, 
     return status;
 }
 
+static mhe_status answer_to(const mhe_host *host, int32_t command, const arguments *w,
+                            char **answer, mhe_error *err) {
+    if (command == 0) {
+        return mhe_model_info(host, w->model, w->json ? MHE_FORMAT_JSON : MHE_FORMAT_TEXT, answer,
+                              err);
+    }
+    if (w->poses == NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "which poses? --poses FILE.json");
+    }
+    return evaluate(host, w, answer, err);
+}
+
 int main(int argc, char **argv) {
-    static const char *const commands[] = {"info", "evaluate"};
     const mhe_host host = console_host("mhe-model");
-    words w = {0};
+    arguments w = {0};
     mhe_error err = {0};
     char *answer = NULL;
-    int32_t chosen = -1;
-    mhe_status status =
-        console_command("mhe-model", help, commands, 2, argc > 1 ? argv[1] : NULL, &chosen, &err);
-    if (status == MHE_OK && chosen >= 0) {
-        status = read_words(argc, argv, chosen, &w, &err);
-        if (status == MHE_OK) {
-            status = chosen == 0
-                         ? mhe_model_info(&host, w.model,
-                                          w.json ? MHE_FORMAT_JSON : MHE_FORMAT_TEXT, &answer, &err)
-                         : evaluate(&host, &w, &answer, &err);
-        }
+    int32_t command = 0, outcome = WORDS_RUN;
+    mhe_status status = words_parse(&program, argc, argv, &w, &command, &outcome, &err);
+    if (status == MHE_OK && outcome == WORDS_HELP) {
+        words_help(&program);
+    } else if (status == MHE_OK && outcome == WORDS_RUN) {
+        status = answer_to(&host, command, &w, &answer, &err);
         if (status == MHE_OK) {
             status = give(w.out, answer, &err);
         }
     }
     mhe_free(answer);
+    words_free(&program, &w);
     return console_end("mhe-model", status, &err);
 }

@@ -37,7 +37,7 @@ refuses() {
 says coordinates 'LowerArm1_RotZ               -28.65 .. 120.3 deg' info "$arm"
 says muscles 'BRA                          Thelen2003' info "$arm"
 says crossed '"crosses":	["LowerArm1_RotZ"]' info "$arm" --json
-says help 'usage: mhe-model info MODEL' --help
+says help 'mhe-model info MODEL' --help
 
 echo '{"poses": [{"q": {"LowerArm1_RotZ": 0.5}}, {"q": {"LowerArm1_RotZ": 0.5}, "u": {"Arm_RotX": 1},
   "activation": {"BRA": 0.3}, "forces": {"BRA": 100},

@@ -51,7 +51,7 @@ static mhe_status run(const char *name, const char *sources, const char *record,
     (void)snprintf(command, sizeof command, "mkdir -p %s", out);
     assert_int_equal(system(command), 0);
     mhe_status status =
-        mhe_config_parse("live.yaml", text, strlen(text), "/", NULL, 0, &host, &config, err);
+        mhe_config_parse("live.yaml", text, strlen(text), "/", NULL, 0, 0, &host, &config, err);
     const mhe_live_setup setup = {.size = sizeof setup, .folder = out, .record = record, .wait = 5};
     status = status == MHE_OK ? mhe_live_open(config, &setup, &live, err) : status;
     status = status == MHE_OK ? mhe_live_run(live, 0, err) : status;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "inspect/inspected.h"
 
+#include "config/defaults.h"
 #include "config/options.h"
 #include "io/model_file.h"
 #include "plugin/instance.h"
@@ -10,14 +11,19 @@
 #include <math.h>
 #include <string.h>
 
-#define MODEL_PLUGIN "mhe.model.simbody"
-#define MUSCLE_PLUGIN "mhe.muscle.hill"
-
-/* The plugin, and a config of defaults and one key set to one word. */
-static mhe_status find(mhi_inspected *m, const char *id, const char *iface, const char *yaml,
+/* The plugin that a config takes for a section where it names none, and a config of defaults and
+ * one key set to one word. */
+static mhe_status find(mhi_inspected *m, const char *section, const char *iface, const char *yaml,
                        const mhe_plugin **plugin, const void **config, mhe_error *err) {
     mhi_tree *tree = NULL;
-    mhe_status status = mhi_registry_find(m->registry, id, iface, plugin, err);
+    const char *id = NULL;
+    mhe_status status = mhi_default_plugin(section, &m->arena, &id, err);
+    if (status == MHE_OK && id == NULL) {
+        status = mhe_fail(err, MHE_E_PLUGIN, "defaults.yaml names no plugin for '%s'", section);
+    }
+    if (status == MHE_OK) {
+        status = mhi_registry_find(m->registry, id, iface, plugin, err);
+    }
     if (status != MHE_OK) {
         return status;
     }
@@ -75,7 +81,7 @@ static mhe_status open_muscles(mhi_inspected *m, mhe_error *err) {
     const void *config;
     mhe_status status = m->all->n_muscles == 0
                             ? MHE_OK
-                            : find(m, MUSCLE_PLUGIN, MHE_MUSCLE_IFACE, "{}", &plugin, &config, err);
+                            : find(m, "muscle", MHE_MUSCLE_IFACE, "{}", &plugin, &config, err);
     if (status != MHE_OK || m->all->n_muscles == 0) {
         return status;
     }
@@ -100,9 +106,9 @@ mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char
         status = mhi_registry_create(m->host, &m->registry, err);
     }
     if (status == MHE_OK) {
-        status = find(m, MODEL_PLUGIN, MHE_MODEL_IFACE,
-                      paths == MHE_PATHS_FITTED ? "{paths: fitted}" : "{}", &m->model,
-                      &m->model_config, err);
+        status =
+            find(m, "model", MHE_MODEL_IFACE, paths == MHE_PATHS_FITTED ? "{paths: fitted}" : "{}",
+                 &m->model, &m->model_config, err);
     }
     if (status == MHE_OK) {
         status = mhi_skeleton_open(m, m->all, &m->skeleton, err);

@@ -41,7 +41,7 @@ static mhe_status start_sources(mhe_live *l, mhe_error *err) {
     if (list->n == 0) {
         return mhe_fail(err, MHE_E_CONFIG,
                         "%s: there is no section 'sources': where do the data come from? As in "
-                        "sources: [{plugin: mhe.source.recording}]",
+                        "sources: [{plugin: ID, ...}] (mhe-run --list-plugins)",
                         l->run->path);
     }
     l->intakes = calloc((size_t)list->n, sizeof(mhi_intake *));
