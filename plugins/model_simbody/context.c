@@ -41,6 +41,30 @@ static mhe_status check_placement(const tree *t, mhe_error *err) {
     return status;
 }
 
+/* Lists what each path depends on. */
+static mhe_status list_own(simbody_model *model, mhe_error *err) {
+    size_t n_p = (size_t)model->tree->n_muscles, n_q = (size_t)model->tree->n_q;
+    uint8_t *pattern = calloc(n_p * n_q + 1, 1);
+    model->own_start = calloc(n_p + 1, sizeof *model->own_start);
+    model->own = calloc(n_p * n_q + 1, sizeof *model->own);
+    if (pattern == NULL || model->own_start == NULL || model->own == NULL) {
+        free(pattern);
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
+    }
+    mhe_status status = simbody_path_pattern(model, pattern, err);
+    int32_t n = 0;
+    for (size_t p = 0; p < n_p; p++) {
+        for (size_t i = 0; i < n_q; i++) {
+            if (pattern[p * n_q + i]) {
+                model->own[n++] = (int32_t)i;
+            }
+        }
+        model->own_start[p + 1] = n;
+    }
+    free(pattern);
+    return status;
+}
+
 /* A mass matrix that is singular is no error until accelerations are asked for. */
 static void warn_massless(const mhe_host *host, const simbody_model *model) {
     for (int32_t i = 0; i < model->tree->n_q && host != NULL; i++) {
@@ -76,6 +100,9 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
             status = mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
         }
     }
+    if (status == MHE_OK) {
+        status = list_own(model, err);
+    }
     if (status != MHE_OK) {
         simbody_destroy(model);
         return status;
@@ -90,6 +117,8 @@ void simbody_destroy(void *self) {
     if (model != NULL) {
         free(model->bundles);
         routes_free(model->routes);
+        free(model->own_start);
+        free(model->own);
         tree_free(model->tree);
         free(model);
     }
@@ -154,6 +183,8 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
     c->description = model->description;
     c->tree = model->tree;
     c->routes = model->routes;
+    c->own_start = model->own_start;
+    c->own = model->own;
     c->bundles = model->bundles;
     c->n_bundles = model->n_bundles;
     c->dynamics = model->dynamics;

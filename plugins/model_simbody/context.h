@@ -14,6 +14,7 @@ typedef struct simbody_model {
     const mhe_description *description;
     tree *tree;
     route_set *routes;
+    int32_t *own_start, *own; /* path p depends on own[own_start[p] .. own_start[p + 1]] */
     path_bundle *bundles;
     int32_t n_bundles;
     int32_t dynamics; /* SIMBODY_DYNAMICS_* */
@@ -23,6 +24,7 @@ typedef struct simbody_context {
     const mhe_description *description;
     const tree *tree;
     const route_set *routes;
+    const int32_t *own_start, *own; /* the model's */
     route_work route_work;
     const path_bundle *bundles; /* [n_bundles] the model's */
     int32_t n_bundles;
