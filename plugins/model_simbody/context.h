@@ -11,6 +11,9 @@
 #include "skeleton.h"
 
 typedef struct simbody_model {
+    const mhe_host *host;   /* NULL: none */
+    struct path_fits *fits; /* NULL: paths are exact */
+    route_set *whole;       /* of the fitted paths */
     const mhe_description *description;
     tree *tree;
     route_set *routes;
@@ -21,6 +24,7 @@ typedef struct simbody_model {
 } simbody_model;
 
 typedef struct simbody_context {
+    const mhe_host *host;
     const mhe_description *description;
     const tree *tree;
     const route_set *routes;
