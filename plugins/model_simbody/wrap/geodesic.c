@@ -16,7 +16,7 @@
 #define COARSE 1e-5 /* likewise, while a string is far from its end */
 #define STEP 0.7    /* longest step, as an angle by the curvature where it begins */
 #define MAX_HALVINGS 12
-#define MAX_STEPS 400
+#define MAX_STEPS 60
 #define MAX_NEWTON 20
 #define MAX_CUTS 6
 #define NEAR 1e-3    /* miss, relative to the surface's size: from here on, fine steps */
@@ -183,10 +183,18 @@ static double geodesic_step(int torus, const double *w, const double *y, double 
     return error;
 }
 
+/* What lengths on the surface are compared with: the tube of a torus, else the longest half axis.
+ */
+static double surface_scale(const wrap_surface *surface) {
+    return surface->kind == MHE_OBSTACLE_TORUS
+               ? surface->size[0]
+               : fmax(surface->size[0], fmax(surface->size[1], surface->size[2]));
+}
+
 void geodesic_follow(const wrap_surface *surface, const double *x, const double *t, double length,
                      double accuracy, geodesic_state *end) {
     double y[STATES] = {x[0], x[1], x[2], t[0], t[1], t[2], 1, 0, 0, 1};
-    double scale = fmax(surface->size[0], surface->size[1]), left = length;
+    double scale = surface_scale(surface), left = length;
     double w[3] = {1 / surface->size[0], surface->size[1], 0};
     int torus = surface->kind == MHE_OBSTACLE_TORUS;
     for (int i = 0; i < 3 && !torus; i++) {
@@ -208,6 +216,9 @@ void geodesic_follow(const wrap_surface *surface, const double *x, const double 
         }
         memcpy(y, next, sizeof y);
         left = h == left ? 0 : left - h;
+    }
+    if (left != 0) { /* too long for any string */
+        y[0] = NAN;
     }
     memcpy(end->y, y, sizeof y);
 }
@@ -291,7 +302,7 @@ static double newton_step(const shot *now, double scale, double *step) {
 
 int string_shoot(const wrap_surface *surface, const double *p, const double *s,
                  const string_start *start, double *turn, wrap_string *out) {
-    double scale = fmax(surface->size[0], surface->size[1]), limit = SOLVED * scale;
+    double scale = surface_scale(surface), limit = SOLVED * scale;
     double arc = start->arc, accuracy = start->near ? FINE : COARSE, step[2];
     shot now;
     *turn = start->turn;
