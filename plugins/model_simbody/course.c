@@ -424,6 +424,23 @@ static void joints_tighten(const path_route *route, route_work *work) {
     }
 }
 
+/* Where the passes never came to rest, a string may be that of other ends: of these, then. */
+static void strings_renew(const path_route *route, route_work *work) {
+    for (int32_t i = 0; i < work->n_pieces; i++) {
+        const course_piece *piece = &work->pieces[i];
+        const double *ends[2], *tried = work->tried + 6 * (piece->wrap < 0 ? 0 : piece->wrap);
+        if (piece->wrap < 0 || piece->joint[0] >= 0 || piece->joint[1] >= 0) {
+            continue;
+        }
+        piece_ends(work, piece, ends);
+        if (memcmp(tried, ends[0], 3 * sizeof *tried) != 0 ||
+            memcmp(tried + 3, ends[1], 3 * sizeof *tried) != 0) {
+            work->state[piece->wrap] = string_between(route, piece->wrap, ends[0], ends[1], NULL,
+                                                      work, &work->strings[piece->wrap]);
+        }
+    }
+}
+
 void course_find(const path_route *route, const path_pose *pose, const double *numbers,
                  route_work *work) {
     work->n_stops = 0;
@@ -441,6 +458,9 @@ void course_find(const path_route *route, const path_pose *pose, const double *n
     }
     wraps_insert(route, work);
     pieces_make(route, work);
+    if (route->n_wraps > 1) {
+        strings_renew(route, work);
+    }
     if (work->n_joints > 0) {
         joints_tighten(route, work);
     }

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#define RETRIES 9
+#define RETRIES 5
 #define RETRY_TURN 0.3 /* rad */
 #define AROUND 16      /* places looked at for where to begin */
 #define FULL_TURN 6.283185307179586
