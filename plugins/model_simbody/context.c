@@ -2,6 +2,8 @@
 /* context.c: instances of the model and the memory of their contexts. */
 #include "context.h"
 
+#include "fit.h"
+
 #include <mhe/host.h>
 
 #include <math.h>
@@ -41,6 +43,30 @@ static mhe_status check_placement(const tree *t, mhe_error *err) {
     return status;
 }
 
+/* Lists what each path depends on. */
+static mhe_status list_own(simbody_model *model, mhe_error *err) {
+    size_t n_p = (size_t)model->tree->n_muscles, n_q = (size_t)model->tree->n_q;
+    uint8_t *pattern = calloc(n_p * n_q + 1, 1);
+    model->own_start = calloc(n_p + 1, sizeof *model->own_start);
+    model->own = calloc(n_p * n_q + 1, sizeof *model->own);
+    if (pattern == NULL || model->own_start == NULL || model->own == NULL) {
+        free(pattern);
+        return mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
+    }
+    mhe_status status = simbody_path_pattern(model, pattern, err);
+    int32_t n = 0;
+    for (size_t p = 0; p < n_p; p++) {
+        for (size_t i = 0; i < n_q; i++) {
+            if (pattern[p * n_q + i]) {
+                model->own[n++] = (int32_t)i;
+            }
+        }
+        model->own_start[p + 1] = n;
+    }
+    free(pattern);
+    return status;
+}
+
 /* A mass matrix that is singular is no error until accelerations are asked for. */
 static void warn_massless(const mhe_host *host, const simbody_model *model) {
     for (int32_t i = 0; i < model->tree->n_q && host != NULL; i++) {
@@ -54,6 +80,54 @@ static void warn_massless(const mhe_host *host, const simbody_model *model) {
     }
 }
 
+static void model_unbuild(simbody_model *model) {
+    free(model->bundles);
+    routes_free(model->routes);
+    routes_free(model->whole);
+    free(model->own_start);
+    free(model->own);
+    tree_free(model->tree);
+    model->bundles = NULL;
+    model->routes = model->whole = NULL;
+    model->own_start = model->own = NULL;
+    model->tree = NULL;
+}
+
+/* `description`: the model's own, or with polynomials for some paths. */
+static mhe_status model_build(simbody_model *model, const mhe_description *description,
+                              mhe_error *err) {
+    mhe_status status = tree_create(description, &model->tree, err);
+    if (status == MHE_OK) {
+        status = routes_create(description, model->tree, NULL, &model->routes, err);
+    }
+    if (status == MHE_OK) {
+        model->bundles = path_bundles(model->tree, &model->n_bundles);
+        if (model->bundles == NULL) {
+            status = mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
+        }
+    }
+    return status == MHE_OK ? list_own(model, err) : status;
+}
+
+/* Puts polynomials in place of paths; those stay at hand for poses out of range, and to draw. */
+static mhe_status model_fit(simbody_model *model, const simbody_config *c, mhe_error *err) {
+    mhe_status status = fits_create(model->host, model->description, model, c->paths_tolerance,
+                                    c->paths_range, &model->fits, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    model_unbuild(model);
+    status = model_build(model, &model->fits->description, err);
+    if (status == MHE_OK) {
+        status = routes_create(model->description, model->tree, model->fits->description.paths,
+                               &model->whole, err);
+    }
+    if (status == MHE_OK) {
+        routes_join(model->routes, model->whole);
+    }
+    return status;
+}
+
 mhe_status simbody_create(const mhe_host *host, const mhe_description *description,
                           const void *config, void **self, mhe_error *err) {
     const simbody_config *c = config;
@@ -61,20 +135,15 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
     if (model == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
     }
+    model->host = host;
     model->description = description;
     model->dynamics = c->dynamics;
-    mhe_status status = tree_create(description, &model->tree, err);
+    mhe_status status = model_build(model, description, err);
     if (status == MHE_OK) {
         status = check_placement(model->tree, err);
     }
-    if (status == MHE_OK) {
-        status = routes_create(description, model->tree, &model->routes, err);
-    }
-    if (status == MHE_OK) {
-        model->bundles = path_bundles(model->tree, &model->n_bundles);
-        if (model->bundles == NULL) {
-            status = mhe_fail(err, MHE_E_MEMORY, "no memory for the model");
-        }
+    if (status == MHE_OK && c->paths == SIMBODY_PATHS_FITTED) {
+        status = model_fit(model, c, err);
     }
     if (status != MHE_OK) {
         simbody_destroy(model);
@@ -88,9 +157,8 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
 void simbody_destroy(void *self) {
     simbody_model *model = self;
     if (model != NULL) {
-        free(model->bundles);
-        routes_free(model->routes);
-        tree_free(model->tree);
+        model_unbuild(model);
+        fits_free(model->fits);
         free(model);
     }
 }
@@ -153,13 +221,16 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
     }
     c->description = model->description;
     c->tree = model->tree;
+    c->host = model->host;
     c->routes = model->routes;
+    c->own_start = model->own_start;
+    c->own = model->own;
     c->bundles = model->bundles;
     c->n_bundles = model->n_bundles;
     c->dynamics = model->dynamics;
     mhe_status status = context_allocate(c);
     if (status == MHE_OK) {
-        status = route_work_create(c->routes, &c->route_work);
+        status = route_work_create(c->routes, model->whole, &c->route_work);
     }
     if (status != MHE_OK) {
         (void)mhe_fail(err, status, "no memory for a context");
@@ -179,9 +250,21 @@ fail:
     return status;
 }
 
+/* A fitted path whose pose left the range that it was fitted over was exact there. */
+static void tell_left(const simbody_context *c) {
+    if (c->host != NULL && c->route_work.left > 0) {
+        char text[160];
+        (void)snprintf(text, sizeof text,
+                       "%lld lengths of fitted paths were outside their range, and exact there",
+                       (long long)c->route_work.left);
+        c->host->log(c->host, MHE_LOG_INFO, text);
+    }
+}
+
 void simbody_context_destroy(void *context) {
     simbody_context *c = context;
     if (c != NULL) {
+        tell_left(c);
         skeleton_free(c->skeleton);
         route_work_free(&c->route_work);
         free(c->links);

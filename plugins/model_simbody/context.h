@@ -11,18 +11,24 @@
 #include "skeleton.h"
 
 typedef struct simbody_model {
+    const mhe_host *host;   /* NULL: none */
+    struct path_fits *fits; /* NULL: paths are exact */
+    route_set *whole;       /* of the fitted paths */
     const mhe_description *description;
     tree *tree;
     route_set *routes;
+    int32_t *own_start, *own; /* path p depends on own[own_start[p] .. own_start[p + 1]] */
     path_bundle *bundles;
     int32_t n_bundles;
     int32_t dynamics; /* SIMBODY_DYNAMICS_* */
 } simbody_model;
 
 typedef struct simbody_context {
+    const mhe_host *host;
     const mhe_description *description;
     const tree *tree;
     const route_set *routes;
+    const int32_t *own_start, *own; /* the model's */
     route_work route_work;
     const path_bundle *bundles; /* [n_bundles] the model's */
     int32_t n_bundles;

@@ -73,14 +73,21 @@ static void into_frame(const double *frame, const double *at, double *out) {
     }
 }
 
-/* The string of wrap w between two points of ground, in ground. */
+/* The string of wrap w between two points of ground, in ground; `before`: as it was in a step
+ * before of the same pose, or NULL. */
 static int string_between(const path_route *route, int32_t w, const double *p, const double *s,
-                          const route_work *work, wrap_string *out) {
+                          const wrap_string *before, const route_work *work, wrap_string *out) {
     const double *frame = work->obstacles + 12 * w;
     double ends[2][3];
+    wrap_string guess;
     into_frame(frame, p, ends[0]);
     into_frame(frame, s, ends[1]);
-    int state = wrap_solve(&route->wraps[w].surface, ends[0], ends[1], out);
+    if (before != NULL) {
+        into_frame(frame, before->a, guess.a);
+        guess.arc = before->arc;
+    }
+    int state =
+        wrap_solve(&route->wraps[w].surface, ends[0], ends[1], before != NULL ? &guess : NULL, out);
     if (state > 0) {
         place3(frame, frame + 9, out->a, out->a);
         place3(frame, frame + 9, out->b, out->b);
@@ -141,7 +148,7 @@ static void wrap_insert(const path_route *route, int32_t w, route_work *work) {
     const route_wrap *wrap = &route->wraps[w];
     int32_t from, to, best = -1;
     double least = INFINITY, *tried = work->tried + 6 * w, ends[6];
-    wrap_string string, chosen = work->strings[w];
+    wrap_string string, chosen = work->strings[w], last = chosen;
     int32_t before = work->state[w];
     stops_remove(work, w);
     work->state[w] = WRAP_NONE;
@@ -157,9 +164,10 @@ static void wrap_insert(const path_route *route, int32_t w, route_work *work) {
         if (before > 0 && memcmp(tried, a->at, sizeof a->at) == 0 &&
             memcmp(tried + 3, b->at, sizeof b->at) == 0) {
             state = before;
-            string = work->strings[w];
+            string = last;
         } else {
-            state = string_between(route, w, a->at, b->at, work, &string);
+            state =
+                string_between(route, w, a->at, b->at, before > 0 ? &last : NULL, work, &string);
         }
         if (best < 0 && work->state[w] != WRAP_INSIDE) {
             work->state[w] = state; /* of what does not wrap, the first that is inside is told */
@@ -391,7 +399,10 @@ static void joints_tighten(const path_route *route, route_work *work) {
             const double *ends[2];
             int32_t w = piece->wrap;
             piece_ends(work, piece, ends);
-            work->state[w] = string_between(route, w, ends[0], ends[1], work, &work->strings[w]);
+            wrap_string last = work->strings[w];
+            work->state[w] =
+                string_between(route, w, ends[0], ends[1], work->state[w] > 0 ? &last : NULL, work,
+                               &work->strings[w]);
             newton_add(work, stride, work->state[w] > 0 ? &work->strings[w] : NULL, ends,
                        piece->joint, work->newton);
         }
@@ -413,6 +424,23 @@ static void joints_tighten(const path_route *route, route_work *work) {
     }
 }
 
+/* Where the passes never came to rest, a string may be that of other ends: of these, then. */
+static void strings_renew(const path_route *route, route_work *work) {
+    for (int32_t i = 0; i < work->n_pieces; i++) {
+        const course_piece *piece = &work->pieces[i];
+        const double *ends[2], *tried = work->tried + 6 * (piece->wrap < 0 ? 0 : piece->wrap);
+        if (piece->wrap < 0 || piece->joint[0] >= 0 || piece->joint[1] >= 0) {
+            continue;
+        }
+        piece_ends(work, piece, ends);
+        if (memcmp(tried, ends[0], 3 * sizeof *tried) != 0 ||
+            memcmp(tried + 3, ends[1], 3 * sizeof *tried) != 0) {
+            work->state[piece->wrap] = string_between(route, piece->wrap, ends[0], ends[1], NULL,
+                                                      work, &work->strings[piece->wrap]);
+        }
+    }
+}
+
 void course_find(const path_route *route, const path_pose *pose, const double *numbers,
                  route_work *work) {
     work->n_stops = 0;
@@ -430,6 +458,9 @@ void course_find(const path_route *route, const path_pose *pose, const double *n
     }
     wraps_insert(route, work);
     pieces_make(route, work);
+    if (route->n_wraps > 1) {
+        strings_renew(route, work);
+    }
     if (work->n_joints > 0) {
         joints_tighten(route, work);
     }

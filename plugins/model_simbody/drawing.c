@@ -87,8 +87,9 @@ int32_t simbody_path_points(void *context, int32_t path, double *points, int32_t
     }
     for (int32_t i = 0; i < c->routes->n; i++) {
         if (c->routes->routes[i].path == path) {
-            return route_points(&c->routes->routes[i], &pose, c->numbers, &c->route_work, points,
-                                n);
+            const path_route *route = &c->routes->routes[i];
+            return route_points(route->exact != NULL ? route->exact : route, &pose, c->numbers,
+                                &c->route_work, points, n);
         }
     }
     const mhe_path *source = &c->description->paths[path];

@@ -121,15 +121,32 @@ static mhe_status context_motion(simbody_context *c, mhe_error *err) {
     return status;
 }
 
+/* Derivatives of lengths are 0 but in each path's own coordinates. */
+static int lengths_finite(const simbody_context *c, const mhe_kinematics *out) {
+    size_t n_q = (size_t)c->tree->n_q;
+    double sum = 0;
+    for (size_t p = 0; p < (size_t)c->tree->n_muscles; p++) {
+        const int32_t *own = c->own + c->own_start[p];
+        int32_t n = c->own_start[p + 1] - c->own_start[p];
+        for (int32_t i = 0; i < n; i++) {
+            size_t row = p * n_q + (size_t)own[i];
+            sum += out->length_q != NULL ? out->length_q[row] * 0.0 : 0;
+            for (int32_t j = 0; j <= i && out->length_qq != NULL; j++) {
+                sum += out->length_qq[row * n_q + (size_t)own[j]] * 0.0;
+            }
+        }
+    }
+    return sum == 0;
+}
+
 /* Whatever of the outputs was asked for is finite. */
-static int results_finite(const tree *t, const mhe_kinematics *out) {
+static int results_finite(const simbody_context *c, const mhe_kinematics *out) {
+    const tree *t = c->tree;
     size_t n_q = (size_t)t->n_q, n_m = (size_t)t->n_muscles, n_k = 3 * (size_t)t->n_markers;
     size_t n_b = (size_t)t->n_bodies;
     return (out->mass == NULL || all_finite(out->mass, n_q * n_q)) &&
            (out->bias == NULL || all_finite(out->bias, n_q)) &&
-           (out->length == NULL || all_finite(out->length, n_m)) &&
-           (out->length_q == NULL || all_finite(out->length_q, n_m * n_q)) &&
-           (out->length_qq == NULL || all_finite(out->length_qq, n_m * n_q * n_q)) &&
+           (out->length == NULL || all_finite(out->length, n_m)) && lengths_finite(c, out) &&
            (out->marker == NULL || all_finite(out->marker, n_k)) &&
            (out->marker_q == NULL || all_finite(out->marker_q, n_k * n_q)) &&
            (out->body == NULL || all_finite(out->body, 12 * n_b)) &&
@@ -176,7 +193,7 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
     for (int32_t i = 0; i < c->description->n_dependents && out->dependent != NULL; i++) {
         out->dependent[i] = c->numbers[4 * (t->n_q + i)];
     }
-    return results_finite(t, out) ? MHE_OK
+    return results_finite(c, out) ? MHE_OK
                                   : mhe_fail(err, MHE_RETRY, "a result of the model is not finite");
 }
 

@@ -8,8 +8,14 @@
 #define SIMBODY_DYNAMICS_RECURSIVE 0
 #define SIMBODY_DYNAMICS_SIMBODY 1
 
+#define SIMBODY_PATHS_EXACT 0
+#define SIMBODY_PATHS_FITTED 1
+
 typedef struct simbody_config {
-    int32_t dynamics; /* SIMBODY_DYNAMICS_* */
+    int32_t dynamics;       /* SIMBODY_DYNAMICS_* */
+    int32_t paths;          /* SIMBODY_PATHS_* */
+    double paths_tolerance; /* m */
+    double paths_range;     /* share of the coordinates' ranges */
 } simbody_config;
 
 mhe_status simbody_create(const mhe_host *host, const mhe_description *description,

@@ -7,6 +7,15 @@ static const mhe_option simbody_options[] = {
                  "Who computes poses, mass matrix and torques: the plugin's own recursion (faster, "
                  "its poses compared with Simbody's at load) or Simbody; derivatives are the "
                  "recursion's."),
+    MHE_OPT_ENUM(struct simbody_config, paths, "exact", "exact|fitted",
+                 "Lengths of paths: exact, or polynomials fitted over the coordinates' ranges "
+                 "(kept in the user's cache folder); a path that misses the tolerance stays "
+                 "exact."),
+    MHE_OPT_REAL(struct simbody_config, paths_tolerance, 5e-4, 1e-6, 0.1, "m",
+                 "RMS error allowed in fitted lengths; twice that (per radian) in moment arms."),
+    MHE_OPT_REAL(struct simbody_config, paths_range, 1.0, 0.01, 1.0, "1",
+                 "Share of each coordinate's range, about its default, that paths are fitted over; "
+                 "beyond it they are exact."),
 };
 
 static const mhe_model_ops simbody_ops = {

@@ -2,13 +2,26 @@
 /* polynomial.c: lengths that are polynomials of coordinates. */
 #include "route.h"
 
+#include <math.h>
 #include <string.h>
 
-/* x^e and its derivatives by x. */
-static void power(const double *powers, int32_t e, double *out) {
-    out[0] = powers[e];
-    out[1] = e > 0 ? e * powers[e - 1] : 0;
-    out[2] = e > 1 ? e * (e - 1) * powers[e - 2] : 0;
+/* Row e: x^e, or the Chebyshev polynomial T_e(x), with two derivatives. */
+static void factors_of(int chebyshev, double x, int32_t degree, double *row) {
+    const double first[6] = {1, 0, 0, x, 1, 0};
+    memcpy(row, first, sizeof first);
+    for (int32_t e = 2; e <= degree; e++) {
+        const double *a = row + 3 * (e - 1), *b = row + 3 * (e - 2);
+        double *f = row + 3 * e;
+        if (chebyshev) { /* T_e = 2 x T_e-1 - T_e-2 */
+            f[0] = 2 * x * a[0] - b[0];
+            f[1] = 2 * (a[0] + x * a[1]) - b[1];
+            f[2] = 2 * (2 * a[1] + x * a[2]) - b[2];
+        } else {
+            f[0] = x * a[0];
+            f[1] = a[0] + x * a[1];
+            f[2] = 2 * a[1] + x * a[2];
+        }
+    }
 }
 
 /* Value, gradient and hessian by x; `powers` as polynomial_length() lays them out. */
@@ -18,11 +31,12 @@ static double polynomial_by_x(const mhe_polynomial *p, const double *powers, dou
     for (int32_t term = 0; term < p->n_terms; term++) {
         const uint8_t *exponent = p->exponent + (size_t)term * (size_t)n;
         int32_t used = 0, at[POLYNOMIAL_FACTORS];
-        double f[POLYNOMIAL_FACTORS][3], value = p->coef[term];
+        const double *f[POLYNOMIAL_FACTORS];
+        double value = p->coef[term];
         for (int32_t k = 0; k < n; k++) {
             if (exponent[k] > 0) {
                 at[used] = k;
-                power(powers + (size_t)k * POLYNOMIAL_POWERS, exponent[k], f[used]);
+                f[used] = powers + 3 * ((size_t)k * POLYNOMIAL_POWERS + exponent[k]);
                 value *= f[used++][0];
             }
         }
@@ -46,18 +60,25 @@ static double polynomial_by_x(const mhe_polynomial *p, const double *powers, dou
     return length;
 }
 
+int polynomial_is_left(const path_route *route, const double *numbers) {
+    const mhe_polynomial *p = route->length;
+    for (int32_t k = 0; k < p->n; k++) {
+        if (!(fabs(numbers[4 * p->coordinate[k]] - p->centre[k]) <= p->scale[k])) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 double polynomial_length(const path_route *route, const double *numbers, double *scratch,
                          double *gradient, double *hessian) {
     const mhe_polynomial *p = route->length;
     int32_t n = p->n, rows = route->n_own;
-    double *powers = scratch, *g = powers + (size_t)n * POLYNOMIAL_POWERS, *h = g + n;
+    double *powers = scratch, *g = powers + 3 * (size_t)n * POLYNOMIAL_POWERS, *h = g + n;
     for (int32_t k = 0; k < n; k++) {
         double x = (numbers[4 * p->coordinate[k]] - p->centre[k]) / p->scale[k];
-        double *row = powers + (size_t)k * POLYNOMIAL_POWERS;
-        row[0] = 1;
-        for (int32_t e = 1; e <= route->degree; e++) {
-            row[e] = row[e - 1] * x;
-        }
+        factors_of(route->exact != NULL, x, route->degree,
+                   powers + 3 * (size_t)k * POLYNOMIAL_POWERS);
     }
     if (gradient == NULL) {
         return polynomial_by_x(p, powers, NULL, NULL);

@@ -113,18 +113,18 @@ static void wrap_make(const mhe_description *d, const tree *t, const mhe_path_wr
     place3(place->r, place->p, obstacle->p, out->p);
 }
 
-static void points_make(const tree *t, const mhe_path *path, path_route *out) {
+static void points_make(const tree *t, const mhe_path *path, int whole, path_route *out) {
     for (int32_t k = 0; k < path->n_points; k++) {
         const mhe_path_point *source = &path->points[k];
         route_point *point = &out->points[k];
         point->source = source;
         point->place = source->body < 0 ? &ground : &t->bodies[source->body];
         place3(point->place->r, point->place->p, source->location, point->at);
-        out->plain[k] = (uint8_t)route_is_plain(path, k);
+        out->plain[k] = (uint8_t)(!whole && route_is_plain(path, k));
     }
 }
 
-static mhe_status route_make(const mhe_description *d, const tree *t, int32_t index,
+static mhe_status route_make(const mhe_description *d, const tree *t, int32_t index, int whole,
                              path_route *out) {
     const mhe_path *path = &d->paths[index];
     size_t n_factors = path->n_points == 0 ? (size_t)path->length->n : 0;
@@ -146,7 +146,7 @@ static mhe_status route_make(const mhe_description *d, const tree *t, int32_t in
             out->degree = e > out->degree ? e : out->degree;
         }
     }
-    points_make(t, path, out);
+    points_make(t, path, whole, out);
     for (int32_t w = 0; w < path->n_wraps; w++) {
         wrap_make(d, t, &path->wraps[w], &out->wraps[w]);
     }
@@ -158,7 +158,8 @@ static void most(int32_t *value, int32_t other) {
     *value = other > *value ? other : *value;
 }
 
-mhe_status routes_create(const mhe_description *d, const tree *t, route_set **out, mhe_error *err) {
+mhe_status routes_create(const mhe_description *d, const tree *t, const mhe_path *fitted,
+                         route_set **out, mhe_error *err) {
     route_set *set = calloc(1, sizeof *set);
     *out = set;
     if (set == NULL) {
@@ -166,11 +167,12 @@ mhe_status routes_create(const mhe_description *d, const tree *t, route_set **ou
     }
     set->routes = calloc((size_t)d->n_paths + 1, sizeof *set->routes);
     for (int32_t i = 0; i < d->n_paths && set->routes != NULL; i++) {
-        if (!path_is_route(&d->paths[i])) {
+        int whole = fitted != NULL && fitted[i].n_points != d->paths[i].n_points;
+        if (fitted != NULL ? !whole : !path_is_route(&d->paths[i])) {
             continue;
         }
         path_route *made = &set->routes[set->n++];
-        if (route_make(d, t, i, made) != MHE_OK) {
+        if (route_make(d, t, i, whole, made) != MHE_OK) {
             return mhe_fail(err, MHE_E_MEMORY, "no memory for the paths");
         }
         most(&set->n_points, made->n_points);
@@ -205,6 +207,16 @@ void routes_free(route_set *set) {
     free(set);
 }
 
+void routes_join(route_set *set, const route_set *whole) {
+    for (int32_t i = 0; i < set->n; i++) {
+        for (int32_t k = 0; k < whole->n; k++) {
+            if (whole->routes[k].path == set->routes[i].path) {
+                set->routes[i].exact = &whole->routes[k];
+            }
+        }
+    }
+}
+
 void routes_pattern(const route_set *set, int32_t n_q, uint8_t *pattern) {
     for (int32_t i = 0; i < set->n; i++) {
         for (int32_t k = 0; k < set->routes[i].n_own; k++) {
@@ -215,7 +227,13 @@ void routes_pattern(const route_set *set, int32_t n_q, uint8_t *pattern) {
 
 /* ---- scratch ---- */
 
-mhe_status route_work_create(const route_set *set, route_work *out) {
+mhe_status route_work_create(const route_set *routes, const route_set *other, route_work *out) {
+    route_set both = *routes, *set = &both;
+    if (other != NULL) {
+        most(&both.n_points, other->n_points);
+        most(&both.n_wraps, other->n_wraps);
+        most(&both.n_own, other->n_own);
+    }
     size_t n_p = (size_t)set->n_points, n_w = (size_t)set->n_wraps, n = (size_t)set->n_own;
     size_t n_s = n_p + 2 * n_w + 1, n_f = (size_t)set->n_factors;
     memset(out, 0, sizeof *out);
@@ -229,7 +247,7 @@ mhe_status route_work_create(const route_set *set, route_work *out) {
                  {&out->newton, sizeof(double) * 2 * n_w * (2 * n_w + 1)},
                  {&out->gradient, sizeof(double) * n},
                  {&out->hessian, sizeof(double) * n * n},
-                 {&out->polynomial, sizeof(double) * n_f * (POLYNOMIAL_POWERS + 1 + n_f)},
+                 {&out->polynomial, sizeof(double) * n_f * (3 * POLYNOMIAL_POWERS + 1 + n_f)},
                  {&out->strings, sizeof(wrap_string) * n_w},
                  {&out->joints, sizeof(course_joint) * n_w},
                  {&out->steps[0], sizeof(strand_step) * (size_t)set->n_steps},
@@ -270,8 +288,12 @@ void routes_lengths(const tree *t, const route_set *set, const path_pose *pose,
     double *gradient = derive ? work->gradient : NULL, *hessian = derive ? work->hessian : NULL;
     for (int32_t i = 0; i < set->n; i++) {
         const path_route *route = &set->routes[i];
-        int32_t stride = route->n_own;
         double value;
+        if (route->exact != NULL && polynomial_is_left(route, numbers)) {
+            route = route->exact;
+            work->left++;
+        }
+        int32_t stride = route->n_own;
         if (route->length != NULL) {
             value = polynomial_length(route, numbers, work->polynomial, gradient, hessian);
         } else {

@@ -26,11 +26,13 @@ typedef struct route_wrap {
     double r[9], p[3];         /* frame in the link */
 } route_wrap;
 
-typedef struct route {
+typedef struct path_route {
     int32_t path, n_points, n_wraps, n_own;
-    const mhe_polynomial *length; /* instead of points */
-    int32_t *length_local;        /* [length->n] places in own */
-    int32_t degree;               /* largest exponent */
+    const mhe_polynomial *length;   /* instead of points */
+    const struct path_route *exact; /* of a fitted one (whose x^e are Chebyshev's T_e(x)): the path
+                                     * itself; NULL */
+    int32_t *length_local;          /* [length->n] places in own */
+    int32_t degree;                 /* largest exponent */
     route_point *points;
     uint8_t *plain; /* [n_points]: 1 where the piece from this point to the next is a segment of the
                      * tree (and counted there) */
@@ -73,6 +75,7 @@ typedef struct course_piece {
 /* Scratch of one thread, large enough for every route of the model. */
 typedef struct route_work {
     void *memory;
+    int64_t left;       /* evaluations of fitted paths out of their range */
     double *places;     /* [n_points x 3] in ground */
     double *slopes;     /* [n_points x 3 x 4] of moving points */
     course_stop *stops; /* [n_points + 2 n_wraps] */
@@ -97,9 +100,13 @@ typedef struct route_set {
     path_route *routes;
 } route_set;
 
-/* The routes of a description whose tree is made. MHE_E_MEMORY. [cold] */
-mhe_status routes_create(const mhe_description *description, const tree *tree, route_set **out,
-                         mhe_error *err);
+/* The routes of a description whose tree is made. With `fitted` (paths in the same order) they are
+ * those of the paths that are a polynomial there and not here, with all their pieces. MHE_E_MEMORY.
+ * [cold] */
+mhe_status routes_create(const mhe_description *description, const tree *tree,
+                         const mhe_path *fitted, route_set **out, mhe_error *err);
+/* Tells the polynomials among `routes` which of `whole` they were fitted to. */
+void routes_join(route_set *routes, const route_set *whole);
 void routes_free(route_set *routes);
 /* Whether the piece between points k and k + 1 of a path is straight and between fixed points. */
 int route_is_plain(const mhe_path *path, int32_t k);
@@ -107,7 +114,8 @@ int route_is_plain(const mhe_path *path, int32_t k);
 /* Marks what the routes depend on in pattern [n_p x n_q]. */
 void routes_pattern(const route_set *routes, int32_t n_q, uint8_t *pattern);
 
-mhe_status route_work_create(const route_set *routes, route_work *out);
+/* `other` may be NULL. */
+mhe_status route_work_create(const route_set *routes, const route_set *other, route_work *out);
 void route_work_free(route_work *work);
 
 /* Adds the routes to what path_lengths() wrote; NULL: not wanted. `numbers`: as
@@ -137,6 +145,9 @@ void string_derivatives(const wrap_string *string, const double *p, const double
  * own coordinates. */
 double strand_length(const tree *tree, const path_route *route, const path_pose *pose,
                      route_work *work, int32_t *stride, double *gradient, double *hessian);
+
+/* Whether a coordinate is out of centre +- scale. */
+int polynomial_is_left(const path_route *route, const double *numbers);
 
 /* Length, gradient [n_own] and hessian [n_own x n_own] (both NULL: not wanted). */
 double polynomial_length(const path_route *route, const double *numbers, double *scratch,

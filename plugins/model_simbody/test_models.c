@@ -35,19 +35,31 @@ const mhe_model_ops *test_model_ops(void) {
     return plugin->ops;
 }
 
-void test_open(test_instance *out, const mhe_description *description, int32_t dynamics) {
-    simbody_config config = {.dynamics = dynamics};
+static void open_with(test_instance *out, const mhe_description *description,
+                      const simbody_config *config) {
     mhe_error err = {0};
     memset(out, 0, sizeof *out);
     out->description = description;
     out->ops = test_model_ops();
-    if (out->ops->create(&host, description, &config, &out->self, &err) != MHE_OK ||
+    if (out->ops->create(&host, description, config, &out->self, &err) != MHE_OK ||
         out->ops->context_create(out->self, &out->context, &err) != MHE_OK) {
         fail_msg("%s", err.text);
     }
     out->n_q = description->n_coordinates;
     out->n_m = description->n_muscles;
     out->n_k = description->n_markers;
+}
+
+void test_open(test_instance *out, const mhe_description *description, int32_t dynamics) {
+    simbody_config config = {.dynamics = dynamics};
+    open_with(out, description, &config);
+}
+
+void test_open_fitted(test_instance *out, const mhe_description *description, double tolerance,
+                      double range) {
+    simbody_config config = {
+        .paths = SIMBODY_PATHS_FITTED, .paths_tolerance = tolerance, .paths_range = range};
+    open_with(out, description, &config);
 }
 
 void test_close(test_instance *instance) {

@@ -16,6 +16,9 @@ typedef struct test_instance {
 
 /* Opens `description` with mhe.model.simbody, found by the registry; fails the test otherwise. */
 void test_open(test_instance *out, const mhe_description *description, int32_t dynamics);
+/* The same with paths fitted to `tolerance` (m) over `range` of the coordinates' ranges. */
+void test_open_fitted(test_instance *out, const mhe_description *description, double tolerance,
+                      double range);
 void test_close(test_instance *instance);
 const mhe_model_ops *test_model_ops(void);
 

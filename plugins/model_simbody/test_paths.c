@@ -5,6 +5,8 @@
 #include "vector.h"
 
 #include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define N_Q 6
@@ -170,6 +172,7 @@ static test_instance instance;
 
 static int setup(void **state) {
     (void)state;
+    assert_int_equal(setenv("XDG_CACHE_HOME", MHE_TEST_BINARY_DIR "/paths-cache", 1), 0);
     test_open(&instance, &leg, 0);
     return 0;
 }
@@ -348,6 +351,110 @@ static void couplers_are_carried_by_both_dynamics(void **state) {
     test_close(&simbody);
 }
 
+/* ---- fitted ---- */
+
+#define TOLERANCE 2e-3 /* m */
+
+static mhe_coordinate ranged[N_Q];
+static mhe_description fitted_leg;
+
+static void fitted_open(test_instance *out) {
+    fitted_leg = leg;
+    memcpy(ranged, coordinates, sizeof ranged);
+    for (int i = 0; i < N_Q; i++) {
+        ranged[i].lower = i == 4 ? -0.05 : -0.5;
+        ranged[i].upper = -ranged[i].lower;
+        ranged[i].rotational = i != 4;
+    }
+    fitted_leg.coordinates = ranged;
+    test_open_fitted(out, &fitted_leg, TOLERANCE, 0.5);
+}
+
+/* Errors are what was asked for, on poses that the fit has not seen; derivatives are those of the
+ * fitted length; beyond the range it is exact, and points are still there to draw. */
+static void fitted_paths_keep_their_tolerance(void **state) {
+    (void)state;
+    test_instance fitted, exact = instance;
+    uint64_t seed = 99;
+    double square[N_P] = {0}, worst = 0;
+    fitted_open(&fitted);
+    for (int trial = 0; trial < 200; trial++) {
+        double q[N_Q], a[N_P], b[N_P];
+        random_pose(&seed, q);
+        for (int i = 0; i < N_Q; i++) {
+            q[i] *= 0.5;
+        }
+        assert_int_equal(evaluate(q, a, NULL, NULL), 0);
+        instance = fitted;
+        assert_int_equal(evaluate(q, b, NULL, NULL), 0);
+        instance = exact;
+        for (int i = 0; i < N_P; i++) {
+            square[i] += (a[i] - b[i]) * (a[i] - b[i]);
+            worst = fmax(worst, fabs(a[i] - b[i]));
+        }
+    }
+    int32_t off = 0;
+    for (int i = 0; i < N_P; i++) {
+        print_message("%s: %.3f mm RMS\n", paths[i].name, 1e3 * sqrt(square[i] / 200));
+        assert_true(sqrt(square[i] / 200) < 1.3 * TOLERANCE);
+        off += square[i] > 1e-12;
+    }
+    print_message("%d paths are fitted, worst %.2f mm\n", (int)off, 1e3 * worst);
+    assert_true(off >= 4);
+    instance = fitted;
+    for (int trial = 0; trial < 5; trial++) {
+        double q[N_Q], gradient[N_P * N_Q], hessian[N_P * N_Q * N_Q], at[3 * 64];
+        random_pose(&seed, q);
+        for (int i = 0; i < N_Q; i++) {
+            q[i] *= 0.5;
+        }
+        assert_int_equal(evaluate(q, NULL, gradient, hessian), 0);
+        for (watched = 0; watched < N_P; watched++) {
+            assert_true(
+                test_jacobian_error(length_of_q, NULL, q, N_Q, 1, gradient + watched * N_Q) < 1e-7);
+            assert_true(test_jacobian_error(gradient_of_q, NULL, q, N_Q, N_Q,
+                                            hessian + watched * N_Q * N_Q) < 1e-5);
+        }
+        assert_true(fitted.ops->path_points(fitted.context, 2, at, 64) >= 2);
+    }
+    double out[N_Q] = {0.1, 0.2, 0.7, 0.8, 0.02, 0.9}, a[N_P], b[N_P];
+    assert_int_equal(evaluate(out, b, NULL, NULL), 0);
+    instance = exact;
+    assert_int_equal(evaluate(out, a, NULL, NULL), 0);
+    for (int i = 0; i < N_P; i++) { /* (what does not depend on those stays fitted) */
+        assert_near(b[i], a[i], i == 0 || i == 7 ? 1e-2 : 1e-12);
+    }
+    test_close(&fitted);
+}
+
+/* From the cache come the same bits; a file that is damaged is not believed. */
+static void fits_are_kept(void **state) {
+    (void)state;
+    test_instance first, second, third, exact = instance;
+    double q[N_Q] = {0.1, -0.2, 0.2, 0.2, 0.01, -0.2}, a[N_P], b[N_P], c[N_P];
+    char command[1400];
+    fitted_open(&first);
+    fitted_open(&second);
+    instance = first;
+    assert_int_equal(evaluate(q, a, NULL, NULL), 0);
+    instance = second;
+    assert_int_equal(evaluate(q, b, NULL, NULL), 0);
+    assert_memory_equal(a, b, sizeof a);
+    (void)snprintf(command, sizeof command,
+                   "for f in '%s'/mhe/paths-*.fit; do head -c 500 \"$f\" > \"$f.cut\" && mv "
+                   "\"$f.cut\" \"$f\"; done",
+                   MHE_TEST_BINARY_DIR "/paths-cache");
+    assert_int_equal(system(command), 0);
+    fitted_open(&third);
+    instance = third;
+    assert_int_equal(evaluate(q, c, NULL, NULL), 0);
+    assert_memory_equal(a, c, sizeof a);
+    instance = exact;
+    test_close(&first);
+    test_close(&second);
+    test_close(&third);
+}
+
 static void refused(const mhe_description *d, const char *part) {
     void *self = NULL;
     mhe_error err = {0};
@@ -401,6 +508,8 @@ int main(void) {
         cmocka_unit_test(points_for_drawing_follow_the_path),
         cmocka_unit_test(obstacles_in_a_row_both_count),
         cmocka_unit_test(couplers_are_carried_by_both_dynamics),
+        cmocka_unit_test(fitted_paths_keep_their_tolerance),
+        cmocka_unit_test(fits_are_kept),
         cmocka_unit_test(senseless_paths_are_refused),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -44,7 +44,7 @@ static scene random_scene(int32_t kind, uint64_t *seed) {
 }
 
 static int solve(const scene *c, wrap_string *out) {
-    return wrap_solve(&c->surface, c->ends, c->ends + 3, out);
+    return wrap_solve(&c->surface, c->ends, c->ends + 3, NULL, out);
 }
 
 /* ---- lengths ---- */
@@ -119,9 +119,13 @@ static double beads_length(const scene *c, const wrap_string *string) {
     double total = wrap_length(string), length = 0;
     for (int k = 0; k <= BEADS; k++) {
         double at = total * k / BEADS, on = at - string->straight[0], off = on - string->arc;
+        double bulge = c->surface.kind == MHE_OBSTACLE_TORUS
+                           ? 0
+                           : -on * off / string->arc; /* to stay on this side of the obstacle */
         for (int i = 0; i < 3; i++) {
             x[k][i] = on < 0    ? c->ends[i] + at * string->t[0][i]
-                      : off < 0 ? string->a[i] + on / string->arc * (string->b[i] - string->a[i])
+                      : off < 0 ? string->a[i] + on / string->arc * (string->b[i] - string->a[i]) +
+                                      bulge * (string->n[0][i] + string->n[1][i])
                                 : string->b[i] + off * string->t[1][i];
         }
         if (k > 0 && k < BEADS) {

@@ -12,8 +12,8 @@
 #include <math.h>
 #include <string.h>
 
-#define FAN 16    /* planes, as half planes about the straight line */
-#define SAMPLES 6 /* of an arc's length */
+#define FAN 12    /* planes, as half planes about the straight line */
+#define SAMPLES 4 /* of an arc's length */
 #define TRIED 3   /* strings solved exactly at most */
 #define NEAR 0.03 /* of the length: planes that are not worse than that may hold the shortest */
 #define OUTSIDE 1e-9
@@ -113,10 +113,8 @@ typedef struct fan_string {
 } fan_string;
 
 static void fan_string_at(const fan *f, double angle, int axis, fan_string *out) {
-    static const double node[SAMPLES / 2] = {0.238619186083197, 0.661209386466265,
-                                             0.932469514203152};
-    static const double weight[SAMPLES / 2] = {0.467913934572691, 0.360761573048139,
-                                               0.171324492379170};
+    static const double node[SAMPLES / 2] = {0.339981043584856, 0.861136311594053};
+    static const double weight[SAMPLES / 2] = {0.652145154862546, 0.347854845137454};
     double w[3], c = cos(angle), depth = f->off * c;
     double radius = sqrt(1 - f->off * f->off + depth * depth), centre[3], b[3];
     for (int i = 0; i < 3; i++) {
@@ -205,13 +203,31 @@ static int shortest_of(const wrap_surface *surface, const double *p, const doubl
     return isfinite(shortest);
 }
 
+/* From a string between ends nearby: 0: found. */
+static int solve_near(const wrap_surface *surface, const double *p, const double *s, const fan *f,
+                      const wrap_string *guess, wrap_string *out) {
+    contact_circle circle;
+    double from[3], turn;
+    contact_circle_of(f, &circle);
+    for (int i = 0; i < 3; i++) {
+        from[i] = guess->a[i] / f->size[i] - circle.centre[i];
+    }
+    string_start start = {.contact = circle_contact,
+                          .data = &circle,
+                          .turn = atan2(dot3(from, circle.axes[1]), dot3(from, circle.axes[0])),
+                          .arc = guess->arc,
+                          .near = 1};
+    return string_shoot(surface, p, s, &start, &turn, out);
+}
+
 int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
-                   wrap_string *out) {
+                   const wrap_string *guess, wrap_string *out) {
     fan f;
     fan_string strings[FAN];
     int needs = fan_of(surface, p, s, &f), axis = surface->side_axis;
     int allowed[FAN], any = 0;
-    if (needs != WRAP_CROSSED) {
+    if (needs != WRAP_CROSSED ||
+        (guess != NULL && solve_near(surface, p, s, &f, guess, out) == 0)) {
         return needs;
     }
     for (int k = 0; k < FAN; k++) {

@@ -4,6 +4,7 @@
  * II.9), and strings by shooting along it. */
 #include "geodesic.h"
 
+#include "../../clones.h"
 #include "../vector.h"
 
 #include <math.h>
@@ -11,13 +12,13 @@
 
 #define STATES 10
 #define LEVELS 8    /* of extrapolation: 2, 4 .. 16 substeps */
-#define FINE 1e-11  /* error of a step less one order, relative to the surface's size */
+#define FINE 1e-10  /* error of a step less one order, relative to the surface's size */
 #define COARSE 1e-5 /* likewise, while a string is far from its end */
 #define STEP 0.7    /* longest step, as an angle by the curvature where it begins */
 #define MAX_HALVINGS 12
-#define MAX_STEPS 400
-#define MAX_NEWTON 40
-#define MAX_CUTS 8
+#define MAX_STEPS 60
+#define MAX_NEWTON 20
+#define MAX_CUTS 6
 #define NEAR 1e-3    /* miss, relative to the surface's size: from here on, fine steps */
 #define LONGEST 7.0  /* sizes: no string is longer on its surface */
 #define MAX_TURN 0.5 /* rad, sizes: longest step of Newton's method */
@@ -75,43 +76,90 @@ void surface_shape_at(const wrap_surface *surface, const double *x, const double
     }
 }
 
-static void geodesic_rate(const wrap_surface *surface, const double *y, double *rate) {
-    surface_shape shape;
-    surface_shape_at(surface, y, y + 3, NULL, &shape);
+#define INLINED static inline __attribute__((always_inline))
+
+/* Rates of a state on the ellipsoid whose inverse squared half axes are w. */
+INLINED void ellipsoid_rate(const double *w, const double *y, double *rate) {
+    double g[3] = {y[0] * w[0], y[1] * w[1], y[2] * w[2]};
+    double inverse = 1 / (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    double bend = (y[3] * y[3] * w[0] + y[4] * y[4] * w[1] + y[5] * y[5] * w[2]) * inverse;
+    double gauss = w[0] * w[1] * w[2] * inverse * inverse;
     for (int i = 0; i < 3; i++) {
         rate[i] = y[3 + i];
-        rate[3 + i] = -shape.bend * shape.normal[i];
+        rate[3 + i] = -bend * g[i];
     }
     rate[6] = y[7];
-    rate[7] = -shape.gauss * y[6];
+    rate[7] = -gauss * y[6];
     rate[8] = y[9];
-    rate[9] = -shape.gauss * y[8];
+    rate[9] = -gauss * y[8];
+}
+
+/* On the torus; w: curvature of the tube, radius of the ring. */
+INLINED void torus_rate(const double *w, const double *y, double *rate) {
+    double inverse = 1 / sqrt(y[0] * y[0] + y[1] * y[1]), e[2] = {y[0] * inverse, y[1] * inverse};
+    double out = 1 - w[1] * inverse; /* share of the distance from the axis */
+    double around = out * w[0], turn = e[0] * y[4] - e[1] * y[3];
+    double bend = w[0] + (around - w[0]) * turn * turn, gauss = around * w[0];
+    double k = -bend * w[0];
+    rate[0] = y[3];
+    rate[1] = y[4];
+    rate[2] = y[5];
+    rate[3] = k * out * y[0];
+    rate[4] = k * out * y[1];
+    rate[5] = k * y[2];
+    rate[6] = y[7];
+    rate[7] = -gauss * y[6];
+    rate[8] = y[9];
+    rate[9] = -gauss * y[8];
+}
+
+INLINED void geodesic_rate(int torus, const double *w, const double *y, double *rate) {
+    if (torus) {
+        torus_rate(w, y, rate);
+    } else {
+        ellipsoid_rate(w, y, rate);
+    }
 }
 
 /* One step of the midpoint rule in n substeps, without the last smoothing. */
-static void midpoint_step(const wrap_surface *surface, const double *y, const double *first,
-                          double h, int n, double *out) {
-    double last[STATES], rate[STATES], sub = h / n;
-    memcpy(last, y, sizeof last);
+INLINED void midpoint_step(int torus, const double *w, const double *y, double h, int n,
+                           double *out) {
+    double last[STATES], rate[STATES], sub = h / n, at[STATES];
+    geodesic_rate(torus, w, y, rate);
     for (int i = 0; i < STATES; i++) {
-        out[i] = y[i] + sub * first[i];
+        last[i] = y[i];
+        at[i] = y[i] + sub * rate[i];
     }
     for (int k = 1; k < n; k++) {
-        geodesic_rate(surface, out, rate);
+        geodesic_rate(torus, w, at, rate);
         for (int i = 0; i < STATES; i++) {
             double next = last[i] + 2 * sub * rate[i];
-            last[i] = out[i];
-            out[i] = next;
+            last[i] = at[i];
+            at[i] = next;
         }
     }
+    memcpy(out, at, sizeof at);
+}
+
+CLONES static void midpoint_ellipsoid(const double *w, const double *y, double h, int n,
+                                      double *out) {
+    midpoint_step(0, w, y, h, n, out);
+}
+
+CLONES static void midpoint_torus(const double *w, const double *y, double h, int n, double *out) {
+    midpoint_step(1, w, y, h, n, out);
 }
 
 /* Extrapolated step; returns its error in units of what is allowed. */
-static double geodesic_step(const wrap_surface *surface, const double *y, const double *first,
-                            double h, double scale, double accuracy, double *out) {
+static double geodesic_step(int torus, const double *w, const double *y, double h, double scale,
+                            double accuracy, double *out) {
     double table[LEVELS][STATES], error = INFINITY;
     for (int k = 0; k < LEVELS && !(error < 1); k++) {
-        midpoint_step(surface, y, first, h, 2 * (k + 1), out);
+        if (torus) {
+            midpoint_torus(w, y, h, 2 * (k + 1), out);
+        } else {
+            midpoint_ellipsoid(w, y, h, 2 * (k + 1), out);
+        }
         for (int m = 1; m <= k; m++) { /* table[m - 1]: of the coarser row, then of this one */
             double ratio = (double)(k + 1) / (double)(k + 1 - m);
             double factor = 1 / (ratio * ratio - 1);
@@ -135,27 +183,42 @@ static double geodesic_step(const wrap_surface *surface, const double *y, const 
     return error;
 }
 
+/* What lengths on the surface are compared with: the tube of a torus, else the longest half axis.
+ */
+static double surface_scale(const wrap_surface *surface) {
+    return surface->kind == MHE_OBSTACLE_TORUS
+               ? surface->size[0]
+               : fmax(surface->size[0], fmax(surface->size[1], surface->size[2]));
+}
+
 void geodesic_follow(const wrap_surface *surface, const double *x, const double *t, double length,
                      double accuracy, geodesic_state *end) {
     double y[STATES] = {x[0], x[1], x[2], t[0], t[1], t[2], 1, 0, 0, 1};
-    double scale = fmax(surface->size[0], surface->size[1]), left = length;
+    double scale = surface_scale(surface), left = length;
+    double w[3] = {1 / surface->size[0], surface->size[1], 0};
+    int torus = surface->kind == MHE_OBSTACLE_TORUS;
+    for (int i = 0; i < 3 && !torus; i++) {
+        w[i] = 1 / (surface->size[i] * surface->size[i]);
+    }
     for (int step = 0; step < MAX_STEPS && left != 0; step++) {
-        double first[STATES], next[STATES];
+        double next[STATES];
         surface_shape shape;
         surface_shape_at(surface, y, y + 3, NULL, &shape);
-        geodesic_rate(surface, y, first);
         double curvature = fmax(fabs(shape.bend), sqrt(fabs(shape.gauss)));
         double h = left, longest = STEP / curvature;
         if (!(fabs(h) <= longest)) {
             h = copysign(longest, left);
         }
         for (int k = 0; k < MAX_HALVINGS; k++, h /= 2) {
-            if (geodesic_step(surface, y, first, h, scale, accuracy, next) < 1) {
+            if (geodesic_step(torus, w, y, h, scale, accuracy, next) < 1) {
                 break;
             }
         }
         memcpy(y, next, sizeof y);
         left = h == left ? 0 : left - h;
+    }
+    if (left != 0) { /* too long for any string */
+        y[0] = NAN;
     }
     memcpy(end->y, y, sizeof y);
 }
@@ -239,8 +302,8 @@ static double newton_step(const shot *now, double scale, double *step) {
 
 int string_shoot(const wrap_surface *surface, const double *p, const double *s,
                  const string_start *start, double *turn, wrap_string *out) {
-    double scale = fmax(surface->size[0], surface->size[1]), limit = SOLVED * scale;
-    double arc = start->arc, accuracy = COARSE, step[2];
+    double scale = surface_scale(surface), limit = SOLVED * scale;
+    double arc = start->arc, accuracy = start->near ? FINE : COARSE, step[2];
     shot now;
     *turn = start->turn;
     if (string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now) != 0) {

@@ -32,6 +32,7 @@ typedef struct string_start {
     void (*contact)(const void *data, double turn, double *a, double *a_turn);
     const void *data;
     double turn, arc; /* where to begin */
+    int near;         /* that is known to be close */
 } string_start;
 
 /* Newton for (turn, arc) such that the string hits s. 0: solved; then *turn is the solution's. */

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-#define RETRIES 9
+#define RETRIES 5
 #define RETRY_TURN 0.3 /* rad */
 #define AROUND 16      /* places looked at for where to begin */
 #define FULL_TURN 6.283185307179586
@@ -41,7 +41,7 @@ static void curve_contact(const void *data, double turn, double *a, double *a_tu
 /* Squared distance of a point of the line from the ring, or rather from the circle in the tube. */
 static double ring_distance(double ring, const double *p, const double *d, double at) {
     double x = p[0] + at * d[0], y = p[1] + at * d[1], z = p[2] + at * d[2];
-    double off = hypot(x, y) - ring;
+    double off = sqrt(x * x + y * y) - ring;
     return off * off + z * z;
 }
 
@@ -84,7 +84,7 @@ static double meridian_length(const meridian *m, double turn, double *arc) {
     v[1] = atan2(b[2], hypot(b[0], b[1]) - m->from.ring);
     double angle = m->growing * (v[1] - v[0]);
     /* off a meridian that the string does not touch, the angle is less than none */
-    angle -= FULL_TURN * floor(angle / FULL_TURN + 0.25);
+    angle -= FULL_TURN * floor(angle / FULL_TURN + 0.4);
     for (int end = 0; end < 2; end++) {
         const double *x = end ? b : a, *other = end ? m->to.p : m->from.p;
         double w[3] = {x[0] - other[0], x[1] - other[1], x[2] - other[2]};
@@ -94,32 +94,46 @@ static double meridian_length(const meridian *m, double turn, double *arc) {
     return length + *arc;
 }
 
-/* Where about the axis the string touches: it is in the way most where the meridian's string has
- * the longest arc; about there, where it is shortest. *arc: on the tube. */
+/* Where about the axis the string touches, of AROUND meridians: where it is shortest among those
+ * that are in its way (arc > 0). Where these are in several stretches, the string has to pass all,
+ * and the one that makes it longest holds it. Without any: where it is least off. */
+static int contact_meridian(const double *length, const double *on) {
+    int best = -1, deepest = 0;
+    for (int k = 0; k < AROUND; k++) {
+        deepest = on[k] > on[deepest] ? k : deepest;
+    }
+    for (int first = 0; first < AROUND; first++) {
+        if (!(on[first] > 0) || (on[(first + AROUND - 1) % AROUND] > 0 && first > 0)) {
+            continue; /* not where a stretch begins */
+        }
+        int low = first;
+        for (int k = 1; k < AROUND && on[(first + k) % AROUND] > 0; k++) {
+            int at = (first + k) % AROUND;
+            low = length[at] < length[low] ? at : low;
+        }
+        for (int k = 1; k < AROUND && on[(first + AROUND - k) % AROUND] > 0; k++) {
+            int at = (first + AROUND - k) % AROUND; /* (of the one that begins before 0) */
+            low = length[at] < length[low] ? at : low;
+        }
+        best = best < 0 || length[low] > length[best] ? low : best;
+    }
+    return best < 0 ? deepest : best;
+}
+
 static double contact_guess(const wrap_surface *surface, const meridian *m, double *arc) {
-    double length[AROUND], on[AROUND], width = FULL_TURN / AROUND, best;
-    int deepest = 0, axis = surface->side_axis;
+    double length[AROUND], on[AROUND], width = FULL_TURN / AROUND;
+    int axis = surface->side_axis;
     for (int k = 0; k < AROUND; k++) {
         double x[2] = {cos(k * width), sin(k * width)};
         length[k] = meridian_length(m, k * width, &on[k]);
         if (axis >= 0 && axis < 2 && x[axis] * surface->side_sign < 0) {
             on[k] = -INFINITY;
         }
-        deepest = on[k] > on[deepest] ? k : deepest;
     }
-    int nearest = deepest;
-    for (int way = -1; way <= 1; way += 2) {
-        for (int k = 1; k < AROUND; k++) {
-            int at = (deepest + way * k + AROUND) % AROUND;
-            if (!(on[at] > 0)) {
-                break;
-            }
-            nearest = length[at] < length[nearest] ? at : nearest;
-        }
-    }
-    best = nearest * width;
-    *arc = on[nearest];
-    double least = *arc > 0 ? length[nearest] : INFINITY, most = *arc;
+    int nearest = contact_meridian(length, on);
+    double best = nearest * width, most = on[nearest];
+    double least = most > 0 ? length[nearest] : INFINITY;
+    *arc = most;
     for (int level = 0; level < 2; level++) {
         width /= 4;
         double middle = best;
@@ -136,7 +150,8 @@ static double contact_guess(const wrap_surface *surface, const meridian *m, doub
     return best;
 }
 
-int wrap_torus(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
+int wrap_torus(const wrap_surface *surface, const double *p, const double *s,
+               const wrap_string *guess, wrap_string *out) {
     double tube = surface->size[0], ring = surface->size[1], zero[3] = {0, 0, 0};
     if (ring_distance(ring, p, zero, 0) <= tube * tube ||
         ring_distance(ring, s, zero, 0) <= tube * tube) {
@@ -160,7 +175,17 @@ int wrap_torus(const wrap_surface *surface, const double *p, const double *s, wr
                   .growing = growing};
     string_start start = {.contact = curve_contact, .data = &m.from};
     wrap_string string;
-    double turn, nearest = contact_guess(surface, &m, &start.arc), shortest = INFINITY;
+    double turn;
+    if (guess != NULL) {
+        start.turn = atan2(guess->a[1], guess->a[0]);
+        start.arc = guess->arc;
+        start.near = 1;
+        if (string_shoot(surface, p, s, &start, &turn, out) == 0) {
+            return needs;
+        }
+        start.near = 0;
+    }
+    double nearest = contact_guess(surface, &m, &start.arc), shortest = INFINITY;
     start.turn = nearest;
     if (string_shoot(surface, p, s, &start, &turn, out) == 0) {
         return needs;

@@ -10,16 +10,17 @@
 #define FULL_TURN 6.283185307179586
 #define TOUCHING 1e-9 /* turns: rounding where the string just touches is not a turn */
 
-int wrap_solve(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
+int wrap_solve(const wrap_surface *surface, const double *p, const double *s,
+               const wrap_string *guess, wrap_string *out) {
     switch (surface->kind) {
     case MHE_OBSTACLE_SPHERE:
         return wrap_sphere(surface, p, s, out);
     case MHE_OBSTACLE_CYLINDER:
         return wrap_cylinder(surface, p, s, out);
     case MHE_OBSTACLE_ELLIPSOID:
-        return wrap_ellipsoid(surface, p, s, out);
+        return wrap_ellipsoid(surface, p, s, guess, out);
     default:
-        return wrap_torus(surface, p, s, out);
+        return wrap_torus(surface, p, s, guess, out);
     }
 }
 
@@ -204,7 +205,7 @@ static int cylinder_needs(const wrap_surface *surface, const double *p, const do
 
 int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
     double radius = surface->size[0], half = 0.5 * surface->size[1];
-    double distance[2] = {hypot(p[0], p[1]), hypot(s[0], s[1])};
+    double distance[2] = {sqrt(p[0] * p[0] + p[1] * p[1]), sqrt(s[0] * s[0] + s[1] * s[1])};
     double angle[2] = {atan2(p[1], p[0]), atan2(s[1], s[0])};
     if (distance[0] <= radius || distance[1] <= radius) {
         return WRAP_INSIDE;
@@ -221,7 +222,8 @@ int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
     circle_tangents(radius, distance, angle, sense, &ring);
     /* unrolled, the string is one straight line */
     double across = ring.straight[0] + radius * ring.turn + ring.straight[1];
-    double rise = s[2] - p[2], length = hypot(across, rise), stretch = length / across;
+    double rise = s[2] - p[2], length = sqrt(across * across + rise * rise),
+           stretch = length / across;
     double at[2] = {ring.start, ring.start + sense * ring.turn}, *points[2] = {out->a, out->b};
     points[0][2] = p[2] + rise * ring.straight[0] / across;
     points[1][2] = s[2] - rise * ring.straight[1] / across;

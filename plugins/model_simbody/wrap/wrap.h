@@ -37,8 +37,10 @@ typedef struct wrap_string {
 #define WRAP_CROSSED 2     /* wraps, since the straight line crosses it */
 #define WRAP_UNSOLVED (-2) /* no geodesic was found: no wrap */
 
-/* The string from p to s, if it wraps (> 0). Depends on its arguments alone. [any] */
-int wrap_solve(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
+/* The string from p to s, if it wraps (> 0). `guess`: a string between ends nearby, which is where
+ * it is looked for; NULL: none is known. Depends on its arguments alone. [any] */
+int wrap_solve(const wrap_surface *surface, const double *p, const double *s,
+               const wrap_string *guess, wrap_string *out);
 
 double wrap_length(const wrap_string *string);
 
@@ -48,7 +50,9 @@ void wrap_curvature(const wrap_string *string, double *pp, double *ps, double *s
 /* Of the kinds; as wrap_solve(). */
 int wrap_sphere(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
 int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
-int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
-int wrap_torus(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
+int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
+                   const wrap_string *guess, wrap_string *out);
+int wrap_torus(const wrap_surface *surface, const double *p, const double *s,
+               const wrap_string *guess, wrap_string *out);
 
 #endif
