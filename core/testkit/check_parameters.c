@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* check_parameters.c: global parameters of a stage problem: a line of points that a drift p_0 moves
  * and an offset p_1 is measured with. Linear, so the optimality conditions of solver.h decide. */
+#include "dense_covariance.h"
 #include "kit.h"
 
 #include <math.h>
@@ -123,6 +124,27 @@ static void conditions(const mhe_stage_problem *problem, const iterate *w, doubl
     }
 }
 
+static void check_covariance(mhi_kit *kit, const mhe_solver_ops *ops, void *self,
+                             const mhe_stage_problem *problem, const mhe_solution *at) {
+    const char *check = "parameters: covariance against a dense inverse";
+    mhe_error err = {0};
+    mhi_dense dense;
+    if (ops->covariance == NULL) {
+        return;
+    }
+    if (!mhi_dense_make(problem, at, &dense) || dense.n_gone_p != 1) {
+        mhi_kit_fail(kit, check, "the dense system is singular, or no parameter at its bound");
+    } else {
+        const double worst = mhi_dense_compare(&dense, ops, self, &err);
+        if (isnan(worst)) {
+            mhi_kit_fail(kit, check, "%s", err.text);
+        } else {
+            (void)mhi_kit_limit(kit, check, worst, 1e-6);
+        }
+    }
+    mhi_dense_free(&dense);
+}
+
 static void check_solve(mhi_kit *kit, const mhe_solver_ops *ops, void *self,
                         const mhe_stage_problem *problem) {
     const char *check = "parameters: solve";
@@ -156,6 +178,7 @@ static void check_solve(mhi_kit *kit, const mhe_solver_ops *ops, void *self,
             mhi_kit_fail(kit, check, "p = %g, %g; one is to be at its bound", w.p[0], w.p[1]);
         }
     }
+    check_covariance(kit, ops, self, problem, &at);
 }
 
 void mhi_check_parameters(mhi_kit *kit) {

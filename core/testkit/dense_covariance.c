@@ -30,24 +30,32 @@ static void add_block(mhi_dense *d, int32_t row, int32_t column, const double *b
 /* What evaluate() gives at one node. */
 typedef struct values {
     double *xx, *ux, *uu, *A, *B, *next;
+    double *px, *pu, *pp, *P; /* NULL: no parameters */
 } values;
 
 static int32_t fill_node(mhi_dense *d, const mhe_stage_problem *p, const mhe_solution *at,
                          int32_t k, const values *v) {
     static const double minus = -1;
-    const int32_t last = k == d->N, row = d->n_w + k * d->n_x;
+    const int32_t last = k == d->N, row = d->n_w + d->n_p + k * d->n_x;
     const mhe_stage_values out = {.size = sizeof out,
                                   .hess_xx = v->xx,
                                   .hess_ux = last ? NULL : v->ux,
                                   .hess_uu = last ? NULL : v->uu,
                                   .x_next = last ? NULL : v->next,
                                   .A = last ? NULL : v->A,
-                                  .B = last ? NULL : v->B};
+                                  .B = last ? NULL : v->B,
+                                  .hess_px = v->px,
+                                  .hess_pp = v->pp,
+                                  .hess_pu = last ? NULL : v->pu,
+                                  .P = last ? NULL : v->P};
     if (p->evaluate(p, 0, k, at->x + k * d->n_x, last ? NULL : at->u + k * d->n_u, &out, NULL) !=
         MHE_OK) {
         return 0;
     }
     add_block(d, at_x(d, k, 0), at_x(d, k, 0), v->xx, d->n_x, d->n_x, 0);
+    add_block(d, d->n_w, d->n_w, v->pp, d->n_p, d->n_p, 0);
+    add_block(d, d->n_w, at_x(d, k, 0), v->px, d->n_p, d->n_x, 0);
+    add_block(d, d->n_w, at_x(d, k, 0), v->px, d->n_p, d->n_x, 1);
     if (last) {
         return 1;
     }
@@ -56,6 +64,8 @@ static int32_t fill_node(mhi_dense *d, const mhe_stage_problem *p, const mhe_sol
         add_block(d, k * d->n_z, at_x(d, k, 0), v->ux, d->n_u, d->n_x, transposed);
         add_block(d, row, at_x(d, k, 0), v->A, d->n_x, d->n_x, transposed);
         add_block(d, row, k * d->n_z, v->B, d->n_x, d->n_u, transposed);
+        add_block(d, row, d->n_w, v->P, d->n_x, d->n_p, transposed);
+        add_block(d, d->n_w, k * d->n_z, v->pu, d->n_p, d->n_u, transposed);
         for (int32_t i = 0; i < d->n_x; i++) {
             add_block(d, row + i, at_x(d, k + 1, i), &minus, 1, 1, transposed);
         }
@@ -65,18 +75,27 @@ static int32_t fill_node(mhi_dense *d, const mhe_stage_problem *p, const mhe_sol
 
 /* Hessians and constraints F_k w_k - x_{k+1}. */
 static int32_t fill(mhi_dense *d, const mhe_stage_problem *p, const mhe_solution *at) {
-    const int32_t n_x = d->n_x, n_u = d->n_u;
-    double *memory =
-        calloc((size_t)(2 * n_x * n_x + 2 * n_x * n_u + n_u * n_u + n_x), sizeof(double));
+    const int32_t n_x = d->n_x, n_u = d->n_u, n_p = d->n_p;
+    const int32_t sizes[] = {n_x * n_x, n_x * n_x, n_u * n_x, n_u * n_x, n_u * n_u,
+                             n_x,       n_p * n_x, n_p * n_u, n_p * n_p, n_p * n_x};
+    values v = {0};
+    double **const of[] = {&v.xx, &v.A, &v.ux, &v.B, &v.uu, &v.next, &v.px, &v.pu, &v.pp, &v.P};
+    int32_t total = 0;
+    for (int32_t i = 0; i < 10; i++) {
+        total += sizes[i];
+    }
+    double *memory = calloc((size_t)total, sizeof(double)), *next = memory;
     if (memory == NULL) {
         return 0;
     }
-    values v = {.xx = memory};
-    v.A = v.xx + n_x * n_x;
-    v.ux = v.A + n_x * n_x;
-    v.B = v.ux + n_u * n_x;
-    v.uu = v.B + n_u * n_x;
-    v.next = v.uu + n_u * n_u;
+    for (int32_t i = 0; i < 10; i++) {
+        *of[i] = sizes[i] > 0 && (i < 6 || n_p > 0) ? next : NULL;
+        next += sizes[i];
+    }
+    if (n_p > 0 && p->set_parameters(p, at->p, NULL) != MHE_OK) {
+        free(memory);
+        return 0;
+    }
     int32_t known = 1;
     for (int32_t k = 0; k <= d->N && known; k++) {
         known = fill_node(d, p, at, k, &v);
@@ -106,7 +125,12 @@ static void find_gone(mhi_dense *d, const mhe_stage_problem *p, const mhe_soluti
             d->n_gone_u += k < d->N && d->gone[k * d->n_z + i];
         }
     }
-    for (int32_t i = 0; i < d->n_w; i++) {
+    for (int32_t i = 0; i < d->n_p; i++) {
+        d->gone[d->n_w + i] =
+            is_gone(at->p[i], p->p_lower[i], p->p_upper[i], at->zp_lower[i], at->zp_upper[i]);
+        d->n_gone_p += d->gone[d->n_w + i];
+    }
+    for (int32_t i = 0; i < d->n_w + d->n_p; i++) {
         for (int32_t j = 0; j < d->n && d->gone[i]; j++) {
             d->K[place(d, i, j)] = d->K[place(d, j, i)] = 0;
         }
@@ -160,12 +184,13 @@ static int32_t invert(mhi_dense *d) {
 }
 
 int32_t mhi_dense_make(const mhe_stage_problem *p, const mhe_solution *at, mhi_dense *d) {
-    *d = (mhi_dense){.n_x = p->n_x, .n_u = p->n_u, .n_z = p->n_x + p->n_u, .N = p->n_intervals};
+    *d = (mhi_dense){
+        .n_x = p->n_x, .n_u = p->n_u, .n_p = p->n_p, .n_z = p->n_x + p->n_u, .N = p->n_intervals};
     d->n_w = (d->N + 1) * d->n_z;
-    d->n = d->n_w + d->N * d->n_x;
+    d->n = d->n_w + d->n_p + d->N * d->n_x;
     d->K = calloc((size_t)d->n * (size_t)d->n, sizeof(double));
     d->inverse = calloc((size_t)d->n * (size_t)d->n, sizeof(double));
-    d->gone = calloc((size_t)d->n_w, 1);
+    d->gone = calloc((size_t)(d->n_w + d->n_p), 1);
     if (d->K == NULL || d->inverse == NULL || d->gone == NULL || !fill(d, p, at)) {
         return 0;
     }
@@ -182,7 +207,7 @@ void mhi_dense_free(mhi_dense *d) {
 static double compare(const mhi_dense *d, const double *block, int32_t row, int32_t column,
                       int32_t m, int32_t n) {
     double worst = 0, largest = 0;
-    for (int32_t i = 0; i < d->n_w; i++) {
+    for (int32_t i = 0; i < d->n_w + d->n_p; i++) {
         largest = fmax(largest, d->gone[i] ? 0 : fabs(d->inverse[place(d, i, i)]));
     }
     for (int32_t i = 0; i < m; i++) {
@@ -197,27 +222,43 @@ static double compare(const mhi_dense *d, const double *block, int32_t row, int3
     return worst;
 }
 
+/* Blocks of node k. NaN: covariance() failed. */
+static double compare_node(const mhi_dense *d, const mhe_solver_ops *ops, void *solver, int32_t k,
+                           double *memory, mhe_error *err) {
+    const int32_t n_x = d->n_x, n_u = d->n_u, n_p = d->n_p, last = k == d->N;
+    double *xx = memory, *ux = xx + n_x * n_x, *uu = ux + n_u * n_x, *px = uu + n_u * n_u;
+    double *pu = px + n_p * n_x, *pp = pu + n_p * n_u;
+    const int32_t x = at_x(d, k, 0), u = k * d->n_z;
+    const mhe_covariance out = {.size = sizeof out,
+                                .node = k,
+                                .xx = xx,
+                                .ux = last ? NULL : ux,
+                                .uu = last ? NULL : uu,
+                                .pp = n_p > 0 ? pp : NULL,
+                                .px = n_p > 0 ? px : NULL,
+                                .pu = n_p > 0 && !last ? pu : NULL};
+    if (ops->covariance(solver, &out, err) != MHE_OK) {
+        return NAN;
+    }
+    double worst = compare(d, xx, x, x, n_x, n_x);
+    worst = fmax(worst, compare(d, px, d->n_w, x, n_p, n_x));
+    worst = fmax(worst, compare(d, pp, d->n_w, d->n_w, n_p, n_p));
+    if (!last) {
+        worst = fmax(worst, compare(d, ux, u, x, n_u, n_x));
+        worst = fmax(worst, compare(d, uu, u, u, n_u, n_u));
+        worst = fmax(worst, compare(d, pu, d->n_w, u, n_p, n_u));
+    }
+    return worst;
+}
+
 double mhi_dense_compare(const mhi_dense *d, const mhe_solver_ops *ops, void *solver,
                          mhe_error *err) {
-    double *memory = calloc((size_t)(d->n_z * d->n_z), sizeof(double)), worst = 0;
-    double *xx = memory, *ux = xx + d->n_x * d->n_x, *uu = ux + d->n_u * d->n_x;
-    for (int32_t k = 0; k <= d->N && memory != NULL; k++) {
-        const int32_t last = k == d->N;
-        const mhe_covariance out = {.size = sizeof out,
-                                    .node = k,
-                                    .xx = xx,
-                                    .ux = last ? NULL : ux,
-                                    .uu = last ? NULL : uu};
-        if (ops->covariance(solver, &out, err) != MHE_OK) {
-            worst = NAN;
-            break;
-        }
-        worst = fmax(worst, compare(d, xx, at_x(d, k, 0), at_x(d, k, 0), d->n_x, d->n_x));
-        if (!last) {
-            worst = fmax(worst, compare(d, ux, k * d->n_z, at_x(d, k, 0), d->n_u, d->n_x));
-            worst = fmax(worst, compare(d, uu, k * d->n_z, k * d->n_z, d->n_u, d->n_u));
-        }
+    const int32_t n = d->n_z + d->n_p;
+    double *memory = calloc((size_t)(n * n), sizeof(double)), worst = memory == NULL ? NAN : 0;
+    for (int32_t k = 0; k <= d->N && !isnan(worst); k++) {
+        const double off = compare_node(d, ops, solver, k, memory, err);
+        worst = off <= worst ? worst : off; /* NaN stays */
     }
     free(memory);
-    return memory == NULL ? NAN : worst;
+    return worst;
 }

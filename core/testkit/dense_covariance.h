@@ -6,12 +6,12 @@
 
 #include <mhe/solver.h>
 
-/* Variables w stage by stage (u_k, x_k), then multipliers of the dynamics. */
+/* Variables w stage by stage (u_k, x_k), parameters, then multipliers of the dynamics. */
 typedef struct mhi_dense {
-    int32_t n_x, n_u, n_z, N, n_w, n; /* n = n_w + N n_x */
-    double *K, *inverse;              /* [n x n]; K is used up */
-    uint8_t *gone;                    /* [n_w] at a bound, or fixed: no variable */
-    int32_t n_gone_x, n_gone_u;       /* states of later nodes, and controls, that are */
+    int32_t n_x, n_u, n_p, n_z, N, n_w, n; /* n = n_w + n_p + N n_x */
+    double *K, *inverse;                   /* [n x n]; K is used up */
+    uint8_t *gone;                         /* [n_w + n_p] at a bound, or fixed: no variable */
+    int32_t n_gone_x, n_gone_u, n_gone_p; /* states of later nodes, controls, parameters that are */
 } mhi_dense;
 
 /* Of the problem at `at`, with its multipliers. 0: no memory, a stage without values, or a singular

@@ -47,6 +47,10 @@ static void hold(rti_solver *s) {
             }
         }
     }
+    for (int32_t i = 0; i < shape->n_p; i++) {
+        const ptrdiff_t at = (ptrdiff_t)(shape->N + 1) * shape->ld_z + i;
+        q->fixed[at] = (uint8_t)at_bound(s, at);
+    }
     riccati_read_fixed(&q->riccati);
 }
 
@@ -113,8 +117,9 @@ static mhe_status find(rti_solver *s, mhe_error *err) {
                    : mhe_fail(err, MHE_E_NUMERIC, "the result of the solve has no value");
     }
     hold(s);
+    s->qp.stages = s->trial.stages;
     if (!riccati_factor(&s->qp.riccati, s->trial.stages, s->qp.diagonal) ||
-        riccati_is_singular(&s->qp.riccati)) {
+        riccati_is_singular(&s->qp.riccati) || (shape->n_p > 0 && !border_factor(&s->qp))) {
         return mhe_fail(err, MHE_E_NUMERIC,
                         "the costs do not determine the solution: their Hessian is singular");
     }
@@ -137,10 +142,60 @@ static void give(const rti_solver *s, const double *from, int32_t ld, int32_t ro
     }
 }
 
+/* Answer of entry i of node k to parameter j, W of border.c. */
+static double answer(const rti_solver *s, int32_t j, int32_t k, int32_t i) {
+    return s->qp.border->W[(size_t)j * size_z(&s->shape) + (size_t)(k * s->shape.ld_z + i)];
+}
+
+/* Column j of the parameters' covariance -> border->dp. */
+static const double *covariance_p(const rti_solver *s, int32_t j) {
+    double *column = s->qp.border->dp;
+    const ptrdiff_t at = (ptrdiff_t)(s->shape.N + 1) * s->shape.ld_z;
+    memset(column, 0, sizeof(double) * (size_t)s->shape.ld_p);
+    if (!s->qp.fixed[at + j]) {
+        column[j] = 1;
+        border_solve(&s->qp, column);
+    }
+    return column;
+}
+
+/* What is left where p is known, and what p brings: cov(p, w) = pp W^T, cov(w) += W pp W^T. Rows
+ * from `row`, columns from `column` of (u, x). */
+static void add_parameters(const rti_solver *s, int32_t k, int32_t row, int32_t column,
+                           int32_t n_rows, int32_t n_columns, double *to) {
+    for (int32_t l = 0; l < s->shape.n_p && to != NULL; l++) {
+        const double *pp = covariance_p(s, l);
+        for (int32_t i = 0; i < n_rows; i++) {
+            double of_row = 0;
+            for (int32_t j = 0; j < s->shape.n_p; j++) {
+                of_row += pp[j] * answer(s, j, k, row + i);
+            }
+            for (int32_t j = 0; j < n_columns; j++) {
+                to[i * n_columns + j] += s->scale * of_row * answer(s, l, k, column + j);
+            }
+        }
+    }
+}
+
+/* cov(p, w) of n entries from `first` of (u, x) of node k. */
+static void give_parameters(const rti_solver *s, int32_t k, int32_t first, int32_t n, double *to) {
+    for (int32_t j = 0; j < s->shape.n_p && to != NULL; j++) {
+        const double *pp = covariance_p(s, j);
+        for (int32_t i = 0; i < n; i++) {
+            double sum = 0;
+            for (int32_t l = 0; l < s->shape.n_p; l++) {
+                sum += pp[l] * answer(s, l, k, first + i);
+            }
+            to[j * n + i] = s->scale * sum;
+        }
+    }
+}
+
 mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err) {
     rti_solver *s = self;
-    const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, ld = s->shape.ld_z;
-    if (!s->has_result || out->node < 0 || out->node > s->shape.N) {
+    const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, n_p = s->shape.n_p, k = out->node;
+    const int32_t ld = s->shape.ld_z, ld_x = s->shape.ld_x;
+    if (!s->has_result || k < 0 || k > s->shape.N) {
         return mhe_fail(err, MHE_E_ARGUMENT,
                         s->has_result ? "there is no such node" : "there is no result of a solve");
     }
@@ -148,12 +203,21 @@ mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err)
     if (status != MHE_OK) {
         return status;
     }
-    give(s, s->spread + (ptrdiff_t)out->node * n_x * s->shape.ld_x, s->shape.ld_x, n_x, n_x,
-         out->xx);
-    if (out->node < s->shape.N && (out->ux != NULL || out->uu != NULL)) {
-        join(s, out->node);
+    give(s, s->spread + (ptrdiff_t)k * n_x * ld_x, ld_x, n_x, n_x, out->xx);
+    add_parameters(s, k, n_u, n_u, n_x, n_x, out->xx);
+    give_parameters(s, k, n_u, n_x, out->px);
+    if (k < s->shape.N && (out->ux != NULL || out->uu != NULL)) {
+        join(s, k);
         give(s, s->joint + n_u, ld, n_u, n_x, out->ux);
         give(s, s->joint, ld, n_u, n_u, out->uu);
+        add_parameters(s, k, 0, n_u, n_u, n_x, out->ux);
+        add_parameters(s, k, 0, 0, n_u, n_u, out->uu);
+    }
+    if (k < s->shape.N) {
+        give_parameters(s, k, 0, n_u, out->pu);
+    }
+    for (int32_t j = 0; j < n_p && out->pp != NULL; j++) {
+        give(s, covariance_p(s, j), 0, 1, n_p, out->pp + j * n_p);
     }
     return MHE_OK;
 }

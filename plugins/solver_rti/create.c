@@ -48,6 +48,12 @@ static void place_worker(block *b, const qp_shape *shape, rti_worker *worker) {
     worker->grad_x = cut_doubles(b, n_x);
     worker->grad_u = cut_doubles(b, n_u);
     worker->x_next = cut_doubles(b, n_x);
+    const size_t n_p = (size_t)shape->n_p;
+    worker->px = cut_doubles(b, n_p * n_x);
+    worker->pu = cut_doubles(b, n_p * n_u);
+    worker->pp = cut_doubles(b, n_p * n_p);
+    worker->P = cut_doubles(b, n_p * n_x);
+    worker->grad_p = cut_doubles(b, n_p);
 }
 
 static void place(rti_solver *s, block *b) {
@@ -97,6 +103,11 @@ static int32_t take_memory(rti_solver *s) {
     memset(s->memory, 0, needed.used);
     place(s, &b);
     return 1;
+}
+
+mhe_status rti_accepts(const mhe_stage_problem *problem, const void *config, mhe_error *err) {
+    (void)problem, (void)config, (void)err; /* any: parameters border the recursion */
+    return MHE_OK;
 }
 
 mhe_status rti_create(const mhe_host *host, const mhe_stage_problem *problem, const void *config,

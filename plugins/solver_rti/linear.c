@@ -52,6 +52,36 @@ static double pack_costs(const rti_solver *s, const rti_worker *of, int32_t has_
            finiteness(of->grad_u, n_u);
 }
 
+static double pack_parameter_costs(const rti_solver *s, const rti_worker *of, int32_t has_u,
+                                   qp_stage *stage) {
+    const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, n_p = s->shape.n_p;
+    for (int32_t i = 0; i < n_p; i++) {
+        double *row = stage->C + i * s->shape.ld_z;
+        for (int32_t j = 0; j < n_u && has_u; j++) {
+            row[j] = s->scale * of->pu[i * n_u + j];
+        }
+        for (int32_t j = 0; j < n_x; j++) {
+            row[n_u + j] = s->scale * of->px[i * n_x + j];
+        }
+        for (int32_t j = 0; j < n_p; j++) {
+            stage->D[i * n_p + j] = s->scale * of->pp[i * n_p + j];
+        }
+        stage->d[i] = s->scale * of->grad_p[i];
+    }
+    return finiteness(of->px, n_p * n_x) + finiteness(of->pu, has_u ? n_p * n_u : 0) +
+           finiteness(of->pp, n_p * n_p) + finiteness(of->grad_p, n_p);
+}
+
+static double pack_parameter_dynamics(const rti_solver *s, const rti_worker *of, qp_stage *stage) {
+    const int32_t n_x = s->shape.n_x, n_p = s->shape.n_p;
+    for (int32_t i = 0; i < n_x; i++) {
+        for (int32_t j = 0; j < n_p; j++) {
+            stage->Pt[j * s->shape.ld_x + i] = of->P[i * n_p + j];
+        }
+    }
+    return finiteness(of->P, n_p * n_x);
+}
+
 static double pack_dynamics(const rti_solver *s, const rti_worker *of, qp_stage *stage) {
     const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u;
     for (int32_t i = 0; i < s->shape.n_dense; i++) {
@@ -82,8 +112,16 @@ typedef struct task {
 } task;
 
 static mhe_stage_values values_wanted(const rti_worker *to, int32_t wanted, int32_t has_u,
-                                      double *cost) {
+                                      int32_t has_p, double *cost) {
     mhe_stage_values out = {.size = sizeof out};
+    if (has_p && (wanted & RTI_DERIVATIVES)) {
+        const int32_t costs = wanted & RTI_COSTS, dynamics = wanted & RTI_DYNAMICS;
+        out.grad_p = costs ? to->grad_p : NULL;
+        out.hess_px = costs ? to->px : NULL;
+        out.hess_pp = costs ? to->pp : NULL;
+        out.hess_pu = costs && has_u ? to->pu : NULL;
+        out.P = dynamics && has_u ? to->P : NULL;
+    }
     if (wanted & RTI_COSTS) {
         out.cost = cost;
         if (wanted & RTI_DERIVATIVES) {
@@ -110,7 +148,8 @@ static mhe_status evaluate_stage(const task *t, int32_t worker, int32_t k) {
     qp_stage *stage = &t->point->stages[k];
     const int32_t has_u = k < s->shape.N, derivatives = t->wanted & RTI_DERIVATIVES;
     const double *u = row_z(&s->shape, t->point->w, k), *x = u + s->shape.n_u;
-    const mhe_stage_values out = values_wanted(of, t->wanted, has_u, &s->stage_cost[k]);
+    const mhe_stage_values out =
+        values_wanted(of, t->wanted, has_u, s->shape.n_p > 0, &s->stage_cost[k]);
     mhe_status status =
         s->problem->evaluate(s->problem, worker, k, x, has_u ? u : NULL, &out, &of->error);
     if (status != MHE_OK) {
@@ -121,11 +160,13 @@ static mhe_status evaluate_stage(const task *t, int32_t worker, int32_t k) {
     if (t->wanted & RTI_COSTS) {
         sum += s->stage_cost[k] - s->stage_cost[k];
         sum += derivatives ? pack_costs(s, of, has_u, stage) : 0;
+        sum += derivatives ? pack_parameter_costs(s, of, has_u, stage) : 0;
     }
     if (out.x_next != NULL) {
         const double *next = row_z(&s->shape, t->point->w, k + 1) + s->shape.n_u;
         sum += pack_gap(s, of, next, stage->b);
         sum += derivatives ? pack_dynamics(s, of, stage) : 0;
+        sum += derivatives ? pack_parameter_dynamics(s, of, stage) : 0;
     }
     return sum == 0 ? MHE_OK : MHE_RETRY;
 }
@@ -152,8 +193,20 @@ static mhe_status first_failure(rti_solver *s) {
     return MHE_OK;
 }
 
+/* The parameters of w hold for the evaluations that follow. 0: they have no value. */
+static int32_t set_parameters(rti_solver *s, const double *w) {
+    const double *p = w + (ptrdiff_t)(s->shape.N + 1) * s->shape.ld_z;
+    const mhe_status status =
+        s->shape.n_p > 0 ? s->problem->set_parameters(s->problem, p, s->err) : MHE_OK;
+    s->failure = status < 0 ? status : MHE_OK;
+    return status == MHE_OK;
+}
+
 int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t wanted) {
     const double start = rti_now();
+    if (!set_parameters(s, point->w)) {
+        return 0;
+    }
     task t = {.s = s, .point = point, .wanted = wanted};
     memset(s->stage_status, 0, sizeof(mhe_status) * (size_t)(s->shape.N + 1));
     for (int32_t i = 0; i < s->problem->n_workers; i++) {
@@ -180,6 +233,9 @@ double rti_first_gap(rti_solver *s, const double *w) {
     const rti_worker *of = &s->workers[0];
     const mhe_stage_values out = {.size = sizeof out, .x_next = of->x_next};
     const double *x = w + s->shape.n_u, *next = w + s->shape.ld_z + s->shape.n_u;
+    if (!set_parameters(s, w)) {
+        return INFINITY;
+    }
     const mhe_status status = s->problem->evaluate(s->problem, 0, 0, x, w, &out, s->err);
     const int32_t known = status == MHE_OK && finiteness(of->x_next, s->shape.n_x) == 0;
     double gap = known ? 0 : INFINITY;
@@ -222,6 +278,15 @@ void rti_rescale(rti_solver *s, rti_point *point, double factor) {
         for (int32_t i = 0; i < s->shape.n_z; i++) {
             point->stages[k].g[i] *= factor;
         }
+        for (int32_t i = 0; i < s->shape.n_p * s->shape.ld_z; i++) {
+            point->stages[k].C[i] *= factor;
+        }
+        for (int32_t i = 0; i < s->shape.n_p; i++) {
+            point->stages[k].d[i] *= factor;
+            for (int32_t j = 0; j < s->shape.n_p; j++) {
+                point->stages[k].D[i * s->shape.n_p + j] *= factor;
+            }
+        }
     }
     point->cost *= factor;
 }
@@ -232,6 +297,9 @@ void rti_set_damping(rti_solver *s, rti_point *point, double damping) {
         for (int32_t i = k < s->shape.N ? 0 : s->shape.n_u; i < s->shape.n_z; i++) {
             point->stages[k].H[i * s->shape.ld_z + i] += more;
         }
+    }
+    for (int32_t i = 0; i < s->shape.n_p; i++) {
+        point->stages[0].D[i * s->shape.n_p + i] += more;
     }
     point->damping = damping;
 }
@@ -246,24 +314,33 @@ double rti_gap_sum(const rti_solver *s, const rti_point *point) {
     return sum;
 }
 
+/* Optimality of the variable at place `at` of all w. */
+static void add_variable(const rti_solver *s, const rti_point *point, ptrdiff_t at,
+                         const double *z_lower, const double *z_upper, rti_residuals *r) {
+    if (s->lower[at] == s->upper[at]) {
+        return; /* its multiplier bears any slope */
+    }
+    const double below = z_lower[at], above = z_upper[at], w = point->w[at];
+    r->stationarity = fmax(r->stationarity, fabs(s->slope[at] - below + above));
+    r->complementarity = fmax(r->complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
+    r->complementarity = fmax(r->complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
+}
+
 rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const double *lambda,
                                const double *z_lower, const double *z_upper) {
     rti_residuals r = {0};
     qp_slope(&s->shape, point->stages, NULL, lambda, s->slope);
     for (int32_t k = 0; k <= s->shape.N; k++) {
         for (int32_t i = k < s->shape.N ? 0 : s->shape.n_u; i < s->shape.n_z; i++) {
-            const ptrdiff_t at = (ptrdiff_t)k * s->shape.ld_z + i;
-            if (s->lower[at] == s->upper[at]) {
-                continue; /* its multiplier bears any slope */
-            }
-            const double below = z_lower[at], above = z_upper[at], w = point->w[at];
-            r.stationarity = fmax(r.stationarity, fabs(s->slope[at] - below + above));
-            r.complementarity = fmax(r.complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
-            r.complementarity = fmax(r.complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
+            add_variable(s, point, (ptrdiff_t)k * s->shape.ld_z + i, z_lower, z_upper, &r);
         }
         for (int32_t i = 0; k < s->shape.N && i < s->shape.n_x; i++) {
             r.gap = fmax(r.gap, fabs(point->stages[k].b[i]));
         }
+    }
+    for (int32_t i = 0; i < s->shape.n_p; i++) {
+        add_variable(s, point, (ptrdiff_t)(s->shape.N + 1) * s->shape.ld_z + i, z_lower, z_upper,
+                     &r);
     }
     return r;
 }

@@ -44,6 +44,7 @@ static const mhe_solver_ops rti_ops = {.size = sizeof rti_ops,
                                        .destroy = rti_destroy,
                                        .solve = rti_solve,
                                        .prepare = rti_prepare,
+                                       .accepts = rti_accepts,
                                        .covariance = rti_covariance};
 
 static const mhe_plugin rti_plugin = {

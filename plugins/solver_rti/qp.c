@@ -17,8 +17,9 @@
 
 size_t qp_size(const qp_shape *s) {
     const size_t z = size_z(s), x = size_x(s);
-    const size_t doubles = (4 + 7) * z + (1 + 5) * x + riccati_size(s);
-    const size_t bytes = sizeof(double) * doubles + sizeof(qp_side) * 2 * z + z;
+    const size_t doubles = (4 + 7) * z + (1 + 5) * x + riccati_size(s) + border_size(s);
+    const size_t bytes =
+        (s->n_p > 0 ? 64 : 0) + sizeof(double) * doubles + sizeof(qp_side) * 2 * z + z;
     return (bytes + 63) / 64 * 64;
 }
 
@@ -42,7 +43,11 @@ void qp_place(qp *q, const qp_shape *s, void *memory) {
     for (size_t i = 0; i < sizeof of_x / sizeof of_x[0]; i++) {
         *of_x[i] = take(&m, x);
     }
-    double *recursion = take(&m, riccati_size(s));
+    double *recursion = take(&m, riccati_size(s)), *columns = take(&m, border_size(s));
+    if (s->n_p > 0) {
+        q->border = (qp_border *)take(&m, 64 / sizeof *m);
+        border_place(q->border, s, columns);
+    }
     q->sides = (qp_side *)m;
     q->fixed = (uint8_t *)(q->sides + 2 * z);
     riccati_place(&q->riccati, s, q->fixed, recursion);
@@ -53,6 +58,11 @@ static int32_t first_place(const qp_shape *s, int32_t k) {
     return k < s->N ? 0 : s->n_u;
 }
 
+/* Place of the parameters. */
+static ptrdiff_t first_p(const qp_shape *s) {
+    return (ptrdiff_t)(s->N + 1) * s->ld_z;
+}
+
 void qp_read_bounds(qp *q) {
     const qp_shape *s = q->shape;
     for (int32_t k = 0; k <= s->N; k++) {
@@ -61,6 +71,9 @@ void qp_read_bounds(qp *q) {
             q->fixed[at] = (k == 0 || i < s->n_u) && q->lower[at] == q->upper[at];
         }
     }
+    for (int32_t i = 0; i < s->n_p; i++) {
+        q->fixed[first_p(s) + i] = row_p(s, q->lower)[i] == row_p(s, q->upper)[i];
+    }
     riccati_read_fixed(&q->riccati);
 }
 
@@ -68,27 +81,33 @@ static void add_side(qp *q, ptrdiff_t at, double sign, double bound, double z) {
     q->sides[q->n_sides++] = (qp_side){.at = (int32_t)at, .sign = sign, .bound = bound, .z = z};
 }
 
+static void collect_one(qp *q, ptrdiff_t at, int32_t equal) {
+    const double lower = q->lower[at], upper = q->upper[at];
+    if (q->fixed[at] || (lower == upper) != equal) {
+        return;
+    }
+    if (equal) {
+        add_side(q, at, 1, lower, q->z_lower[at] - q->z_upper[at]);
+        return;
+    }
+    if (isfinite(lower)) {
+        add_side(q, at, 1, lower, q->z_lower[at]);
+    }
+    if (isfinite(upper)) {
+        add_side(q, at, -1, upper, q->z_upper[at]);
+    }
+}
+
 /* Equalities: `equal`; else inequalities. */
 static void collect(qp *q, int32_t equal) {
     const qp_shape *s = q->shape;
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = first_place(s, k); i < s->n_z; i++) {
-            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
-            const double lower = q->lower[at], upper = q->upper[at];
-            if (q->fixed[at] || (lower == upper) != equal) {
-                continue;
-            }
-            if (equal) {
-                add_side(q, at, 1, lower, q->z_lower[at] - q->z_upper[at]);
-                continue;
-            }
-            if (isfinite(lower)) {
-                add_side(q, at, 1, lower, q->z_lower[at]);
-            }
-            if (isfinite(upper)) {
-                add_side(q, at, -1, upper, q->z_upper[at]);
-            }
+            collect_one(q, (ptrdiff_t)k * s->ld_z + i, equal);
         }
+    }
+    for (int32_t i = 0; i < s->n_p; i++) {
+        collect_one(q, first_p(s) + i, equal);
     }
 }
 
@@ -144,10 +163,17 @@ static double measure(qp *q) {
                 gap[i] = q->stages[k].b[i] - next[i];
             }
             qp_forward(s, &q->stages[k], row_z(s, q->w, k), gap);
+            if (s->n_p > 0) {
+                qp_forward_p(s, &q->stages[k], row_p(s, q->w), gap);
+            }
             for (int32_t i = 0; i < s->n_x; i++) {
                 q->feasibility = fmax(q->feasibility, fabs(gap[i]));
             }
         }
+    }
+    for (ptrdiff_t at = first_p(s); at < first_p(s) + s->n_p; at++) {
+        q->slope[at] = q->fixed[at] ? 0 : q->slope[at];
+        q->stationarity = fmax(q->stationarity, fabs(q->slope[at]));
     }
     q->open = sum;
     return q->n_inequalities > 0 ? sum / q->n_inequalities : 0;
@@ -174,7 +200,8 @@ static int32_t factorise(qp *q) {
                 i < q->n_inequalities ? side->z / (side->t + q->softness * side->z) : 1 / SOFTNESS;
             q->diagonal[side->at] += side->weight;
         }
-        if (riccati_factor(&q->riccati, q->stages, q->diagonal)) {
+        if (riccati_factor(&q->riccati, q->stages, q->diagonal) &&
+            (q->shape->n_p == 0 || border_factor(q))) {
             return 1;
         }
     }
@@ -204,8 +231,18 @@ static void refine(qp *q) {
             }
             qp_forward(s, &q->stages[k], w, gap);
         }
+        if (s->n_p > 0) {
+            qp_backward_p(s, &q->stages[k], row_p(s, q->dw), rest);
+            if (k < s->N) {
+                qp_forward_p(s, &q->stages[k], row_p(s, q->dw), row_x(s, q->rest_x, k));
+            }
+        }
     }
-    riccati_solve(&q->riccati, q->stages, q->rest_w, q->rest_x, q->fix_w, q->fix_lambda);
+    for (ptrdiff_t at = first_p(s); at < first_p(s) + s->n_p; at++) {
+        q->rest_w[at] = q->rhs[at] + q->diagonal[at] * q->dw[at];
+    }
+    qp_sum_p(s, q->stages, q->dw, q->dlambda, row_p(s, q->rest_w));
+    border_newton(q, q->rest_w, q->rest_x, q->fix_w, q->fix_lambda);
     for (size_t i = 0; i < size_z(s); i++) {
         q->dw[i] += q->fix_w[i];
     }
@@ -227,7 +264,7 @@ static void step(qp *q, double barrier, int32_t second_order) {
         }
         q->rhs[side->at] -= side->sign * side->shift;
     }
-    riccati_solve(&q->riccati, q->stages, q->rhs, q->gap, q->dw, q->dlambda);
+    border_newton(q, q->rhs, q->gap, q->dw, q->dlambda);
     if (q->refine) {
         refine(q);
     }

@@ -57,7 +57,27 @@ typedef struct qp {
     double *diagonal, *rhs, *dw, *dlambda;        /* of a Newton system */
     double *rest_w, *rest_x, *fix_w, *fix_lambda; /* of its refinement */
     riccati riccati;
+    struct qp_border *border; /* of the parameters (border.c); NULL where there are none */
 } qp;
+
+/* ---- border.c: parameters, by the Schur complement of their columns ----
+ *
+ * What the stages answer to each parameter, W_j and Lambda_j, is a solve of its own; S = sum D +
+ * diag d_p + sum (C W - P^T Lambda) is what is left for p. */
+typedef struct qp_border {
+    double *W, *Lambda; /* [n_p][size_z], [n_p][size_x] */
+    double *S;          /* [n_p x n_p], then its Cholesky factor, lower */
+    double *dp;         /* [ld_p] */
+} qp_border;
+
+size_t border_size(const qp_shape *s); /* doubles */
+void border_place(qp_border *border, const qp_shape *s, double *memory);
+/* After riccati_factor(). 0: S is not positive definite. */
+int32_t border_factor(qp *q);
+/* S^-1 of `p` [n_p], in place. */
+void border_solve(const qp *q, double *p);
+/* riccati_solve() with p: g ends with its row, and so does w. */
+void border_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
 
 size_t qp_size(const qp_shape *s); /* bytes, a multiple of 64 */
 void qp_place(qp *q, const qp_shape *s, void *memory);

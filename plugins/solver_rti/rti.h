@@ -40,6 +40,7 @@ typedef struct rti_residuals {
 /* One stage as evaluate() writes it, and why it did not; one thread's. */
 typedef struct rti_worker {
     double *xx, *ux, *uu, *A, *B, *grad_x, *grad_u, *x_next;
+    double *px, *pu, *pp, *P, *grad_p;
     mhe_error error;
     int32_t error_stage;
 } rti_worker;
@@ -131,6 +132,7 @@ int32_t rti_step_globalised(rti_solver *s, int32_t cut);
 int32_t rti_leap_on(rti_solver *s);
 
 /* create.c */
+mhe_status rti_accepts(const mhe_stage_problem *problem, const void *config, mhe_error *err);
 mhe_status rti_create(const mhe_host *host, const mhe_stage_problem *problem, const void *config,
                       void **self, mhe_error *err);
 void rti_destroy(void *self);

@@ -7,7 +7,9 @@
 
 /* ---- between the caller's arrays x [(N+1) x n_x], u [N x n_u] and vectors of all w ---- */
 
-static void gather(const qp_shape *s, const double *x, const double *u, double *w) {
+/* p [n_p] is not looked at where there are none. */
+static void gather(const qp_shape *s, const double *x, const double *u, const double *p,
+                   double *w) {
     for (int32_t k = 0; k <= s->N; k++) {
         double *row = row_z(s, w, k);
         memcpy(row + s->n_u, x + k * s->n_x, sizeof(double) * (size_t)s->n_x);
@@ -15,15 +17,21 @@ static void gather(const qp_shape *s, const double *x, const double *u, double *
             memcpy(row, u + k * s->n_u, sizeof(double) * (size_t)s->n_u);
         }
     }
+    for (int32_t i = 0; i < s->n_p; i++) {
+        row_p(s, w)[i] = p[i];
+    }
 }
 
-static void scatter(const qp_shape *s, const double *w, double *x, double *u) {
+static void scatter(const qp_shape *s, const double *w, double *x, double *u, double *p) {
     for (int32_t k = 0; k <= s->N; k++) {
         const double *row = w + (ptrdiff_t)k * s->ld_z;
         memcpy(x + k * s->n_x, row + s->n_u, sizeof(double) * (size_t)s->n_x);
         if (k < s->N) {
             memcpy(u + k * s->n_u, row, sizeof(double) * (size_t)s->n_u);
         }
+    }
+    for (int32_t i = 0; i < s->n_p; i++) {
+        p[i] = w[(ptrdiff_t)(s->N + 1) * s->ld_z + i];
     }
 }
 
@@ -38,8 +46,8 @@ static int32_t is_finite(const double *values, size_t n) {
 /* Bounds; free variables are counted. 0: a lower bound lies above its upper one. */
 static int32_t read_bounds(rti_solver *s, int32_t *n_free) {
     const mhe_stage_problem *p = s->problem;
-    gather(&s->shape, p->x_lower, p->u_lower, s->lower);
-    gather(&s->shape, p->x_upper, p->u_upper, s->upper);
+    gather(&s->shape, p->x_lower, p->u_lower, p->p_lower, s->lower);
+    gather(&s->shape, p->x_upper, p->u_upper, p->p_upper, s->upper);
     *n_free = 0;
     for (size_t i = 0; i < size_z(&s->shape); i++) { /* what is no variable is fixed to 0 */
         if (!(s->lower[i] <= s->upper[i])) {
@@ -58,7 +66,7 @@ static int32_t read_bounds(rti_solver *s, int32_t *n_free) {
 static int32_t read_start(rti_solver *s, const mhe_solution *start) {
     const qp_shape *shape = &s->shape;
     const size_t n = size_z(shape);
-    gather(shape, start->x, start->u, s->trial.w);
+    gather(shape, start->x, start->u, start->p, s->trial.w);
     const int32_t finite = is_finite(s->trial.w, n);
     for (size_t i = 0; i < n; i++) {
         s->trial.w[i] = fmin(fmax(s->trial.w[i], s->lower[i]), s->upper[i]);
@@ -69,8 +77,8 @@ static int32_t read_start(rti_solver *s, const mhe_solution *start) {
     }
     s->warm = start->has_multipliers;
     if (s->warm) {
-        gather(shape, start->zx_lower, start->zu_lower, s->z_lower);
-        gather(shape, start->zx_upper, start->zu_upper, s->z_upper);
+        gather(shape, start->zx_lower, start->zu_lower, start->zp_lower, s->z_lower);
+        gather(shape, start->zx_upper, start->zu_upper, start->zp_upper, s->z_upper);
         for (int32_t k = 0; k < shape->N; k++) {
             for (int32_t i = 0; i < shape->n_x; i++) {
                 row_x(shape, s->lambda, k)[i] = start->lambda[k * shape->n_x + i];
@@ -155,8 +163,8 @@ static void write_multipliers(rti_solver *s, mhe_solution *out) {
         s->z_lower[i] /= s->scale;
         s->z_upper[i] /= s->scale;
     }
-    scatter(shape, s->z_lower, out->zx_lower, out->zu_lower);
-    scatter(shape, s->z_upper, out->zx_upper, out->zu_upper);
+    scatter(shape, s->z_lower, out->zx_lower, out->zu_lower, out->zp_lower);
+    scatter(shape, s->z_upper, out->zx_upper, out->zu_upper, out->zp_upper);
     for (int32_t k = 0; k < shape->N; k++) {
         for (int32_t i = 0; i < shape->n_x; i++) {
             out->lambda[k * shape->n_x + i] = row_x(shape, s->lambda, k)[i] / s->scale;
@@ -177,7 +185,7 @@ static double largest_gap(rti_solver *s) {
 
 static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info) {
     const rti_leap *leap = &s->leap;
-    scatter(&s->shape, s->here.w, out->x, out->u);
+    scatter(&s->shape, s->here.w, out->x, out->u, out->p);
     write_multipliers(s, out);
     memcpy(s->result, s->here.w, sizeof(double) * size_z(&s->shape));
     s->has_result = 1;
@@ -258,7 +266,7 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
 
 mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err) {
     rti_solver *s = self;
-    gather(&s->shape, start->x, start->u, s->here.w);
+    gather(&s->shape, start->x, start->u, start->p, s->here.w);
     s->err = err;
     s->prepared = 0;
     s->failure = MHE_OK;

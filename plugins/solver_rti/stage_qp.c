@@ -31,6 +31,8 @@ void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape
                         .n_z = n_x + n_u,
                         .ld_z = KERNEL_LD(n_x + n_u),
                         .ld_x = KERNEL_LD(n_x),
+                        .n_p = problem->n_p,
+                        .ld_p = problem->n_p > 0 ? KERNEL_LD(problem->n_p) : 0,
                         .n_dense = n_x,
                         .control_of = control_of,
                         .kernels = kernels_best()};
@@ -44,9 +46,15 @@ void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape
     }
 }
 
+/* D and d of a stage, to the next multiple of 8. */
+static size_t small_size(const qp_shape *s) {
+    return ((size_t)s->n_p * (size_t)(s->n_p + 1) + 7) / 8 * 8;
+}
+
 size_t qp_stages_size(const qp_shape *s) {
     const size_t matrices = (size_t)(s->n_z + s->n_dense) * (size_t)s->ld_z;
-    return (size_t)(s->N + 1) * (matrices + (size_t)s->ld_z + 3 * (size_t)s->ld_x);
+    const size_t columns = (size_t)s->n_p * (size_t)(s->ld_z + s->ld_x) + small_size(s);
+    return (size_t)(s->N + 1) * (matrices + (size_t)s->ld_z + 3 * (size_t)s->ld_x + columns);
 }
 
 void qp_stages_place(const qp_shape *s, double *memory, qp_stage *stages) {
@@ -59,7 +67,11 @@ void qp_stages_place(const qp_shape *s, double *memory, qp_stage *stages) {
         stage->by_state = stage->g + s->ld_z;
         stage->by_control = stage->by_state + s->ld_x;
         stage->b = stage->by_control + s->ld_x;
-        memory = stage->b + s->ld_x;
+        stage->C = stage->b + s->ld_x;
+        stage->Pt = stage->C + s->n_p * s->ld_z;
+        stage->D = stage->Pt + s->n_p * s->ld_x;
+        stage->d = stage->D + s->n_p * s->n_p;
+        memory = stage->D + small_size(s);
     }
 }
 
@@ -84,6 +96,54 @@ void qp_backward(const qp_shape *s, const qp_stage *stage, double alpha, const d
     }
 }
 
+void qp_forward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *next) {
+    s->kernels->add_transposed(s->n_p, s->n_x, 1, stage->Pt, s->ld_x, p, next);
+}
+
+void qp_backward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *w_out) {
+    s->kernels->add_transposed(s->n_p, s->n_z, 1, stage->C, s->ld_z, p, w_out);
+}
+
+void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
+              double *out) {
+    const double *p = w + (ptrdiff_t)(s->N + 1) * s->ld_z;
+    for (int32_t k = 0; k <= s->N && s->n_p > 0; k++) {
+        const qp_stage *stage = &stages[k];
+        s->kernels->add(s->n_p, s->n_z, 1, stage->C, s->ld_z, w + (ptrdiff_t)k * s->ld_z, out);
+        for (int32_t i = 0; i < s->n_p; i++) {
+            for (int32_t j = 0; j < s->n_p; j++) {
+                out[i] += stage->D[i * s->n_p + j] * p[j];
+            }
+        }
+        if (k < s->N) {
+            s->kernels->add(s->n_p, s->n_x, -1, stage->Pt, s->ld_x, lambda + (ptrdiff_t)k * s->ld_x,
+                            out);
+        }
+    }
+}
+
+/* The slope's row of p; `w` NULL: 0. */
+static void slope_p(const qp_shape *s, const qp_stage *stages, const double *w,
+                    const double *lambda, double *out) {
+    double *slope = row_p(s, out);
+    memset(slope, 0, sizeof(double) * (size_t)s->ld_p);
+    for (int32_t k = 0; k <= s->N; k++) {
+        for (int32_t i = 0; i < s->n_p; i++) {
+            slope[i] += stages[k].d[i];
+        }
+        if (w == NULL && k < s->N) {
+            s->kernels->add(s->n_p, s->n_x, -1, stages[k].Pt, s->ld_x,
+                            lambda + (ptrdiff_t)k * s->ld_x, slope);
+        }
+        if (w != NULL) {
+            qp_backward_p(s, &stages[k], w + (ptrdiff_t)(s->N + 1) * s->ld_z, row_z(s, out, k));
+        }
+    }
+    if (w != NULL) {
+        qp_sum_p(s, stages, w, lambda, slope);
+    }
+}
+
 void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out) {
     for (int32_t k = 0; k <= s->N; k++) {
@@ -99,5 +159,8 @@ void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const 
         if (k < s->N) {
             qp_backward(s, &stages[k], -1, lambda + (ptrdiff_t)k * s->ld_x, slope);
         }
+    }
+    if (s->n_p > 0) {
+        slope_p(s, stages, w, lambda, out);
     }
 }

@@ -5,7 +5,10 @@
  *     subject to x_{k+1} = F_k w_k + b_k,  lower_k <= w_k <= upper_k      F_k = [B_k A_k]
  *
  * At the last stage the part of u is there but empty. Vectors of all w have rows of ld_z doubles,
- * those of states rows of ld_x; everything behind n_z or n_x is zero. */
+ * those of states rows of ld_x; everything behind n_z or n_x is zero.
+ *
+ * With global parameters p, each stage has also p^T C_k w_k + 1/2 p^T D_k p + d_k^T p, and its
+ * dynamics P_k p. Vectors of all w then end with a row of p. */
 #ifndef STAGE_QP_H
 #define STAGE_QP_H
 
@@ -16,6 +19,7 @@
 typedef struct qp_shape {
     int32_t N, n_x, n_u, n_z; /* n_z = n_u + n_x */
     int32_t ld_z, ld_x;
+    int32_t n_p, ld_p; /* ld_p = 0 where there are none */
     /* States from n_dense on depend on themselves and on one control at most (activations), or on
      * none. */
     int32_t n_dense;
@@ -32,6 +36,8 @@ typedef struct qp_stage {
         *by_control; /* the other rows: factors of the state and of its control [n_x] */
     double *g;       /* [ld_z] */
     double *b;       /* [ld_x] */
+    double *C, *Pt;  /* [n_p x ld_z], and P^T [n_p x ld_x] */
+    double *D, *d;   /* [n_p x n_p], [n_p] */
 } qp_stage;
 
 /* Rows of a stage's vectors. */
@@ -41,9 +47,13 @@ static inline double *row_z(const qp_shape *s, double *w, int32_t k) {
 static inline double *row_x(const qp_shape *s, double *w, int32_t k) {
     return w + (ptrdiff_t)k * s->ld_x;
 }
+/* The parameters, behind all stages. */
+static inline double *row_p(const qp_shape *s, double *w) {
+    return w + (ptrdiff_t)(s->N + 1) * s->ld_z;
+}
 /* Doubles of such vectors over all stages. */
 static inline size_t size_z(const qp_shape *s) {
-    return (size_t)(s->N + 1) * (size_t)s->ld_z;
+    return (size_t)(s->N + 1) * (size_t)s->ld_z + (size_t)s->ld_p;
 }
 static inline size_t size_x(const qp_shape *s) {
     return (size_t)(s->N + 1) * (size_t)s->ld_x;
@@ -59,6 +69,12 @@ void qp_stages_place(const qp_shape *s, double *memory, qp_stage *stages);
 void qp_forward(const qp_shape *s, const qp_stage *stage, const double *w, double *next);
 void qp_backward(const qp_shape *s, const qp_stage *stage, double alpha, const double *lambda,
                  double *w_out);
+/* next [n_x] += P p, and w_out [n_z] += C^T p. */
+void qp_forward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *next);
+void qp_backward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *w_out);
+/* out [n_p] += sum over stages of C_k w_k + D_k p - P_k^T lambda_k; `w` with its p. */
+void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
+              double *out);
 /* Slope of the Lagrangian without bounds: out = H w + g + (lambda_{k-1} on x) - F^T lambda_k, all
  * stages. `w` NULL: 0. */
 void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,

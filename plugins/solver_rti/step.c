@@ -87,6 +87,31 @@ static void accept(rti_solver *s, double length) {
     accept_multipliers(s, length);
 }
 
+/* Share of the parameters in it, of the step in s->slope. */
+static double model_cost_p(rti_solver *s) {
+    const qp_shape *shape = &s->shape;
+    double *step = row_p(shape, s->slope), *slope = row_p(shape, s->qp.slope), cost = 0;
+    for (int32_t i = 0; i < shape->n_p; i++) {
+        step[i] = row_p(shape, s->trial.w)[i] - row_p(shape, s->here.w)[i];
+        slope[i] = -0.5 * s->here.damping * step[i];
+    }
+    for (int32_t k = 0; k <= shape->N; k++) {
+        const qp_stage *stage = &s->here.stages[k];
+        shape->kernels->add(shape->n_p, shape->n_z, 1, stage->C, shape->ld_z,
+                            row_z(shape, s->slope, k), slope);
+        for (int32_t i = 0; i < shape->n_p; i++) {
+            slope[i] += stage->d[i];
+            for (int32_t j = 0; j < shape->n_p; j++) {
+                slope[i] += 0.5 * stage->D[i * shape->n_p + j] * step[j];
+            }
+        }
+    }
+    for (int32_t i = 0; i < shape->n_p; i++) {
+        cost += slope[i] * step[i];
+    }
+    return cost;
+}
+
 /* The quadratic model without its damping at the trial point, scaled; the step -> s->slope. */
 static double model_cost(rti_solver *s) {
     const qp_shape *shape = &s->shape;
@@ -104,7 +129,7 @@ static double model_cost(rti_solver *s) {
             cost += slope[i] * step[i];
         }
     }
-    return cost;
+    return shape->n_p > 0 ? cost + model_cost_p(s) : cost;
 }
 
 /* Gaps at the trial point by the linearisation, of the step in s->slope: largest; the sum. */
@@ -118,6 +143,9 @@ static double model_gaps(rti_solver *s, double *sum) {
             gap[i] = s->here.stages[k].b[i] - next[i];
         }
         qp_forward(shape, &s->here.stages[k], row_z(shape, s->slope, k), gap);
+        if (shape->n_p > 0) {
+            qp_forward_p(shape, &s->here.stages[k], row_p(shape, s->slope), gap);
+        }
         for (int32_t i = 0; i < shape->n_x; i++) {
             largest = fmax(largest, fabs(gap[i]));
             *sum += fabs(gap[i]);
@@ -217,6 +245,9 @@ static double merit_slope(rti_solver *s) {
         const double *step = row_z(&s->shape, s->qp.w, k);
         for (int32_t i = 0; i < s->shape.n_z; i++) {
             slope += s->here.stages[k].g[i] * step[i];
+        }
+        for (int32_t i = 0; i < s->shape.n_p; i++) {
+            slope += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
         }
     }
     return fmin(slope - s->penalty * s->gap_sum, 0);

@@ -22,15 +22,18 @@
     "model: {file: $ARM19}\nmuscle: {curves: paper2021}\n"                       \
     "data: {markers: " MODELS "demo_markers.trc, emg: " MODELS "demo_emg.sto,\n" \
     "       reference: " MODELS "demo_reference.sto}\n"                          \
-    "horizon: {window: 7, ratio: 1}\ncosts: [mhe.cost.emg-markers-high]\n"       \
+    "costs: [mhe.cost.emg-markers-high]\n"                                       \
     "solver: {plugin: mhe.solver.rti, preset: speed, tolerance: 1e-5}\n"
+#define BY_EXCITATION CONFIG "horizon: {window: 7, ratio: 1}\n"
+#define BY_ACTIVATION CONFIG "horizon: {window: 7, ratio: 3}\nformulation: activation\n"
 
 /* How EMG comes. */
 typedef struct line {
-    double delay;   /* s after its last sample */
-    int32_t swap;   /* packets come in pairs, the later one first */
-    int32_t lose;   /* two of so many are lost; 0: none */
-    int32_t frames; /* EMG comes with its frame instead */
+    const char *config; /* NULL: BY_EXCITATION */
+    double delay;       /* s after its last sample */
+    int32_t swap;       /* packets come in pairs, the later one first */
+    int32_t lose;       /* two of so many are lost; 0: none */
+    int32_t frames;     /* EMG comes with its frame instead */
 } line;
 
 typedef struct outcome {
@@ -45,8 +48,8 @@ typedef struct rig {
     int32_t emg, markers; /* channels */
 } rig;
 
-static void rig_open(rig *r) {
-    if (test_fixture_open(&r->f, CONFIG) != MHE_OK ||
+static void rig_open(rig *r, const char *config) {
+    if (test_fixture_open(&r->f, config) != MHE_OK ||
         mhi_recording_read(r->f.run, mhi_system_description(r->f.system), &r->f.host, &r->recording,
                            &r->f.err) != MHE_OK) {
         fail_msg("%s", r->f.err.text);
@@ -95,14 +98,14 @@ static void deliver(rig *r, const line *l, double from, double to) {
 
 static void run(const line *l, outcome *o) {
     rig r;
-    rig_open(&r);
+    rig_open(&r, l->config == NULL ? BY_EXCITATION : l->config);
     memset(o, 0, sizeof *o);
     for (int32_t k = 0; k < FRAMES; k++) {
         mhe_frame frame = mhi_recording_frame(r.recording, N_K, N_M, k);
         mhe_estimate e = {.size = sizeof e};
         int32_t ready = 0;
         frame.emg = l->frames ? frame.emg : NULL;
-        deliver(&r, l, (k - 1) / 100.0, k / 100.0);
+        deliver(&r, l, k == 0 ? -INFINITY : (k - 1) / 100.0, k / 100.0);
         assert_int_equal(mhe_estimator_push(r.f.estimator, &frame, &e, &ready, &r.f.err), MHE_OK);
         if (ready) {
             const mhe_tracked *t = mhe_tracked_at(&e, r.emg);
@@ -153,6 +156,31 @@ static void no_frame_loses_its_emg(void **state) {
     }
 }
 
+/* EMG may also be there before its frame: the camera's way is the longer one. */
+static void early_emg_waits(void **state) {
+    (void)state;
+    static outcome early;
+    run(&(line){.delay = -0.050}, &early);
+    print_message("packets 50 ms early: forces %.1e N from those in time\n",
+                  apart(&in_time, &early));
+    assert_int_equal(early.n_without, 0);
+    assert_int_equal(early.counts.n_late_nodes, 0);
+    assert_true(apart(&in_time, &early) < 1e-9); /* as if it had come with the frames */
+}
+
+/* Every third frame is a node, which tracks the EMG of two frames ago: so do late samples. */
+static void delay_and_ratio_hold_for_samples(void **state) {
+    (void)state;
+    static outcome on_time, after;
+    run(&(line){.config = BY_ACTIVATION, .frames = 1}, &on_time);
+    run(&(line){.config = BY_ACTIVATION, .delay = 0.040}, &after);
+    const double force = apart(&on_time, &after);
+    print_message("by activation, every third frame: forces %.2f N from those in time\n", force);
+    assert_true(after.n_without <= 1); /* the first node would need EMG from before the first */
+    assert_int_equal(after.counts.n_dropped, 0);
+    assert_true(force > 0 && force < 1);
+}
+
 /* Every node has the EMG that a frame would have brought, whatever the packets' order. */
 static void order_does_not_matter(void **state) {
     (void)state;
@@ -192,7 +220,7 @@ static void a_late_marker_is_screened(void **state) {
     rig r;
     int32_t far = 0, ready = 0, n = 0;
     double most = 0;
-    rig_open(&r);
+    rig_open(&r, BY_EXCITATION);
     for (int32_t k = 0; k < FRAMES; k++) {
         const mhe_frame frame = {.size = sizeof frame,
                                  .time = r.recording->time[k],
@@ -236,7 +264,7 @@ static void a_frame_has_the_last_word(void **state) {
     (void)state;
     rig r;
     double other[N_M];
-    rig_open(&r);
+    rig_open(&r, BY_EXCITATION);
     for (int32_t i = 0; i < N_M; i++) {
         other[i] = 0.9;
     }
@@ -255,9 +283,13 @@ static void a_frame_has_the_last_word(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(no_frame_loses_its_emg),    cmocka_unit_test(order_does_not_matter),
-        cmocka_unit_test(lost_packets_are_a_gap),    cmocka_unit_test(what_is_too_late_is_counted),
-        cmocka_unit_test(a_late_marker_is_screened), cmocka_unit_test(a_frame_has_the_last_word)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(no_frame_loses_its_emg),
+                                       cmocka_unit_test(early_emg_waits),
+                                       cmocka_unit_test(delay_and_ratio_hold_for_samples),
+                                       cmocka_unit_test(order_does_not_matter),
+                                       cmocka_unit_test(lost_packets_are_a_gap),
+                                       cmocka_unit_test(what_is_too_late_is_counted),
+                                       cmocka_unit_test(a_late_marker_is_screened),
+                                       cmocka_unit_test(a_frame_has_the_last_word)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -187,6 +187,18 @@ static void check_node(test_fixture *f, int32_t k, uint64_t *seed) {
     free(z);
 }
 
+/* Told where muscles outnumber the states and have none of their own, and there alone. */
+static void check_low_rank(const test_fixture *f) {
+    const mhe_stage_problem *p = mhi_ocp_face(f->ocp);
+    const mhe_system *s = mhi_system_face(f->system);
+    const int holds = mhi_system_formulation(f->system) == MHE_FORMULATION_ACTIVATION &&
+                      p->n_x == s->n_x && s->n_u > 2 * s->n_q;
+    assert_int_equal(p->low_rank != NULL, holds);
+    for (int32_t i = 0; holds && i < p->n_x * p->n_u; i++) { /* B has no row beyond them */
+        assert_true(!p->B_pattern[i] || i / p->n_u < p->low_rank->n_directions);
+    }
+}
+
 static void stages_match_differences(void **state) {
     (void)state;
     for (size_t i = 0; i < sizeof problems / sizeof problems[0]; i++) {
@@ -199,6 +211,7 @@ static void stages_match_differences(void **state) {
         assert_int_equal(status, MHE_OK);
         mhi_ocp_set_interval(f.ocp, 0.03);
         set_targets(f.ocp, &seed);
+        check_low_rank(&f);
         check_node(&f, 0, &seed);
         check_node(&f, 3, &seed);
         check_node(&f, mhi_ocp_face(f.ocp)->n_intervals, &seed);

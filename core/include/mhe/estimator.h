@@ -3,6 +3,8 @@
  *
  *     mhe_estimator *e;  mhe_error err;
  *     mhe_estimator_open("arm.yaml", NULL, 0, NULL, &e, &err);
+ *     mhe_frame frame = {.size = sizeof frame};
+ *     mhe_estimate estimate = {.size = sizeof estimate};
  *     while (measure(&frame)) {
  *         mhe_estimator_push(e, &frame, &estimate, &ready, &err);
  *         if (ready) { show(estimate.force); }

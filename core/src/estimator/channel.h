@@ -72,10 +72,11 @@ void mhi_channel_believe(mhi_channel *channel, int32_t nodes);
 void mhi_channels_shift(mhi_channels *channels, int32_t filled);
 int32_t mhi_channel_any(const double *values, int32_t n); /* one of them is not NaN */
 
-/* late.c: looks again what the samples say of nodes at times [filled]; `changed` (k) is called for
- * each node and channel that says something else now. */
+/* late.c: looks again what the samples say of nodes at times [filled], which but the newest were in
+ * a solve where `solved`; `changed` (k) is called for each node and channel that says something
+ * else now. */
 typedef void mhi_late_changed(void *data, mhi_channel *channel, int32_t k);
-void mhi_channels_look(mhi_channels *channels, const double *times, int32_t filled,
+void mhi_channels_look(mhi_channels *channels, const double *times, int32_t filled, int32_t solved,
                        mhi_late_changed *changed, void *data);
 
 #endif

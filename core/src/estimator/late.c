@@ -26,7 +26,7 @@ static int32_t look(mhi_channel *c, double time, int32_t k) {
     return news;
 }
 
-void mhi_channels_look(mhi_channels *channels, const double *times, int32_t filled,
+void mhi_channels_look(mhi_channels *channels, const double *times, int32_t filled, int32_t solved,
                        mhi_late_changed *changed, void *data) {
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_channel *c = &channels->rows[i];
@@ -38,7 +38,7 @@ void mhi_channels_look(mhi_channels *channels, const double *times, int32_t fill
             const int32_t empty =
                 !mhi_channel_any(c->measured + (ptrdiff_t)k * c->face.width, c->face.width);
             if (look(c, times[k], k)) {
-                c->counts.n_late_nodes += empty && !newest;
+                c->counts.n_late_nodes += solved && empty && !newest;
                 changed(data, c, k);
             }
         }

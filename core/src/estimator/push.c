@@ -45,7 +45,8 @@ static mhe_status find_interval(mhe_estimator *e, int32_t *known, mhe_error *err
 }
 
 static void look_for_late(mhe_estimator *e) {
-    mhi_channels_look(&e->channels, e->window.times, e->window.filled, mhi_trust_late, e);
+    mhi_channels_look(&e->channels, e->window.times, e->window.filled, mhi_phase_begun(e),
+                      mhi_trust_late, e);
 }
 
 /* The first window from its measurements, once there is a posture in its oldest frame. */

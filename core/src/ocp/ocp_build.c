@@ -24,6 +24,14 @@ static void dynamics_pattern(const mhe_system *f, int32_t n_x, uint8_t *A, uint8
     }
 }
 
+/* Activation-driven with rigid tendons, all controls act on the skeleton alone: however many
+ * muscles there are, B has no more than its states' rows. */
+static void tell_low_rank(mhi_ocp *ocp, const mhe_system *f) {
+    ocp->low_rank = (mhe_low_rank){.size = sizeof ocp->low_rank, .n_directions = 2 * f->n_q};
+    const int32_t holds = f->n_d == 0 && f->n_z == 0 && ocp->signals.n_carried == 0;
+    ocp->face.low_rank = holds && f->n_u > 2 * f->n_q ? &ocp->low_rank : NULL;
+}
+
 /* What is carried moves with all that its signal depends on. */
 static void carried_pattern(const mhi_ocp *ocp, uint8_t *A, uint8_t *B) {
     const int32_t n_x = ocp->face.n_x, n_u = ocp->face.n_u;
@@ -258,6 +266,7 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
         ocp->carried |= ocp->signals.signal[MHI_N_SIGNALS + i].n_y > 0 ? 1u << i : 0;
     }
     ocp->face.n_x = f->n_x + ocp->signals.n_carried; /* as the terms ask */
+    tell_low_rank(ocp, f);
     if (status == MHE_OK) {
         status = take_arrays(ocp, err);
     }

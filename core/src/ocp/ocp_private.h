@@ -20,6 +20,7 @@ typedef struct mhi_ocp_worker {
 struct mhi_ocp {
     mhe_stage_problem face;
     mhe_problem problem;
+    mhe_low_rank low_rank; /* face.low_rank, where it holds */
     mhi_signals signals;
     const mhi_system *system;
     const mhe_integrator_ops *integrator;
