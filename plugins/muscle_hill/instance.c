@@ -147,7 +147,7 @@ static void hill_tell_rigid(const mhe_host *host, const struct hill *hill,
                        "%d of %d tendons stay rigid, shorter than half the fibre or said to be: "
                        "%s%s",
                        count, hill->n, line, strlen(line) + 1 == sizeof line ? " ..." : "");
-        host->log(host, MHE_LOG_INFO, text);
+        host->log(host, MHE_LOG_WARNING, text);
     }
 }
 
