@@ -201,12 +201,14 @@ static mhe_status hill_evaluate(const void *self, const mhe_muscle_point *at,
                                 const mhe_muscle_values *out, mhe_error *err) {
     const struct hill *hill = self;
     const int32_t n = hill->n, n_s = hill->n_states;
-    hill_zero(out->force_s, n_s * n);
-    hill_zero(out->rate, n_s * n);
-    hill_zero(out->rate_e, n_s * n);
-    hill_zero(out->rate_s, n_s * n_s * n);
     hill_zero(out->rate_l, n_s * n);
     hill_zero(out->rate_w, n_s * n);
+    if (n_s > 1) { /* of muscles that lack a state */
+        hill_zero(out->force_s, n_s * n);
+        hill_zero(out->rate, n_s * n);
+        hill_zero(out->rate_e, n_s * n);
+        hill_zero(out->rate_s, n_s * n_s * n);
+    }
     hill_force(hill, at, out);
     return out->rate == NULL && out->rate_e == NULL && out->rate_s == NULL
                ? MHE_OK

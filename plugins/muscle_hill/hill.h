@@ -21,11 +21,12 @@ struct hill_config {
     double vmax;         /* optimal lengths per second; 0: the file's, else 10 */
     double passive;      /* factor of the passive force */
     double passive_ramp; /* n below a jump of the passive force over which it grows; 0: a jump */
-    int32_t tendon;      /* HILL_RIGID, HILL_ELASTIC */
+    int32_t tendon;      /* HILL_RIGID, HILL_ELASTIC, HILL_FILE */
 };
 
 #define HILL_RIGID 0
 #define HILL_ELASTIC 1
+#define HILL_FILE 2 /* elastic but where the file says to ignore it */
 
 #define HILL_ACTIVATION 0 /* the states */
 #define HILL_FIBER 1

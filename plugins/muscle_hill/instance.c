@@ -100,11 +100,12 @@ static mhe_status hill_check_config(const struct hill_config *config, mhe_error 
                         "option out",
                         config->curves == 0 ? "of the file" : set->name);
     }
-    if (!set->published && config->tendon == HILL_ELASTIC) {
-        return mhe_fail(err, MHE_E_CONFIG,
-                        "tendon: elastic; the curves %s have rigid tendons: choose degroote2016, "
-                        "thelen2003 or millard2012",
-                        set->name);
+    if (!set->published && config->tendon != HILL_RIGID) {
+        return mhe_fail(
+            err, MHE_E_CONFIG,
+            "tendon: elastic tendons; the curves %s have rigid tendons: choose degroote2016, "
+            "thelen2003 or millard2012",
+            set->name);
     }
     return MHE_OK;
 }
@@ -129,7 +130,7 @@ static void hill_tell_sets(const mhe_host *host, const mhe_muscle *muscles, int3
 
 /* Says which tendons stay rigid although the config wants them elastic. */
 static void hill_tell_rigid(const mhe_host *host, const struct hill *hill,
-                            const mhe_muscle *muscles) {
+                            const mhe_muscle *muscles, int32_t tendon) {
     char line[256] = "";
     int32_t count = 0;
     size_t used = 0;
@@ -144,10 +145,10 @@ static void hill_tell_rigid(const mhe_host *host, const struct hill *hill,
     if (count > 0) {
         char text[400];
         (void)snprintf(text, sizeof text,
-                       "%d of %d tendons stay rigid, shorter than half the fibre or said to be: "
-                       "%s%s",
-                       count, hill->n, line, strlen(line) + 1 == sizeof line ? " ..." : "");
-        host->log(host, MHE_LOG_INFO, text);
+                       "%d of %d tendons stay rigid, shorter than half the fibre%s: %s%s", count,
+                       hill->n, tendon == HILL_FILE ? " or said to be" : "", line,
+                       strlen(line) + 1 == sizeof line ? " ..." : "");
+        host->log(host, MHE_LOG_WARNING, text);
     }
 }
 
@@ -156,7 +157,7 @@ static void hill_tell_rigid(const mhe_host *host, const struct hill *hill,
 static mhe_status hill_make_elastic(const mhe_muscle *from, const struct hill_config *config,
                                     struct hill_muscle *m, mhe_error *err) {
     double vmax = config->vmax > 0 ? config->vmax : hill_or(from->max_contraction_velocity, 10);
-    m->elastic = from->ignore_tendon_compliance != 1 &&
+    m->elastic = (config->tendon == HILL_ELASTIC || from->ignore_tendon_compliance != 1) &&
                  from->tendon_slack_length >= HILL_SHORT_TENDON * from->optimal_fiber_length;
     m->vmax = vmax;
     m->beta =
@@ -193,7 +194,7 @@ static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *from
         1 / (config->tau_act > 0 ? config->tau_act : hill_or(from->activation_time, 0.010));
     hill->rate_deact[i] =
         1 / (config->tau_deact > 0 ? config->tau_deact : hill_or(from->deactivation_time, 0.040));
-    return config->tendon == HILL_ELASTIC ? hill_make_elastic(from, config, m, err) : MHE_OK;
+    return config->tendon != HILL_RIGID ? hill_make_elastic(from, config, m, err) : MHE_OK;
 }
 
 /* Number of states, their bounds, and who has them. */
@@ -261,8 +262,8 @@ mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t 
     if (config->curves == 0) {
         hill_tell_sets(host, muscles, n_muscles, config);
     }
-    if (config->tendon == HILL_ELASTIC) {
-        hill_tell_rigid(host, hill, muscles);
+    if (config->tendon != HILL_RIGID) {
+        hill_tell_rigid(host, hill, muscles, config->tendon);
     }
     *self = hill;
     return MHE_OK;

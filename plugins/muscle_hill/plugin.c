@@ -24,8 +24,9 @@ static const mhe_option hill_options[] = {
     MHE_OPT_REAL(struct hill_config, passive_ramp, 0, 0, 0.5, "1",
                  "Optimal lengths before the onset of paper2021's passive force over which it "
                  "rises smoothly; 0: the jump as it was."),
-    MHE_OPT_ENUM(struct hill_config, tendon, "rigid", "rigid|elastic",
-                 "Tendons; elastic ones make the fibre length a state, published sets only."),
+    MHE_OPT_ENUM(struct hill_config, tendon, "rigid", "rigid|elastic|file",
+                 "Tendons; elastic ones make the fibre length a state, published sets only; file: "
+                 "elastic but where the model file says to ignore tendon compliance."),
 };
 
 static const mhe_plugin hill_plugin = {

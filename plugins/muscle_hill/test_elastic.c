@@ -190,8 +190,8 @@ static void tendon_landmarks(void **state) {
     }
 }
 
-/* A tendon shorter than half the fibre, or said to be rigid, has no state and pulls as it does
- * beside none; its entries are not read. */
+/* A tendon shorter than half the fibre, or of which the file says so where it is asked, has no
+ * state and pulls as it does beside none; its entries are not read. */
 static void rigid_among_elastic(void **state) {
     (void)state;
     mhe_muscle m[3];
@@ -200,13 +200,18 @@ static void rigid_among_elastic(void **state) {
     }
     m[2].ignore_tendon_compliance = 1;
     struct test_hill hill = test_hill(m, 3, "tendon: elastic"), rigid = test_hill(m, 3, "");
+    static const uint8_t all[] = {1, 1, 1, 1, 0, 1}, expected[] = {1, 1, 1, 1, 0, 0};
     mhe_muscle_layout layout = {.size = sizeof layout};
     assert_non_null(hill.ops);
     assert_int_equal(hill.ops->layout(hill.self, &layout, NULL), MHE_OK);
     assert_int_equal(layout.n_states, 2);
     assert_int_equal(layout.activation, 0);
     assert_string_equal(layout.names[1], "fiber_length");
-    static const uint8_t expected[] = {1, 1, 1, 1, 0, 0};
+    assert_memory_equal(layout.present, all, sizeof all);
+    hill.ops->destroy(hill.self);
+    hill = test_hill(m, 3, "tendon: file");
+    assert_non_null(hill.ops);
+    assert_int_equal(hill.ops->layout(hill.self, &layout, NULL), MHE_OK);
     assert_memory_equal(layout.present, expected, sizeof expected);
     double s[6] = {0.2, 0.5, 0.8, 0.9, NAN, NAN}, e[3] = {0.5, 0.5, 0.5};
     double l[3] = {0.297, 0.13, 0.3}, w[3] = {0.1, -0.1, 0.2}, f[3], f_s[6], rigid_f[3];
@@ -237,7 +242,7 @@ static void refused(void **state) {
          "(muscle.damping), or tendon: rigid",
          0.1},
         {"{tendon: elastic, curves: paper2021}",
-         "tendon: elastic; the curves paper2021 have rigid tendons: choose degroote2016, "
+         "tendon: elastic tendons; the curves paper2021 have rigid tendons: choose degroote2016, "
          "thelen2003 "
          "or millard2012",
          NAN}};
