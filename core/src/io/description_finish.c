@@ -115,18 +115,19 @@ static double *locked_at(mhi_builder *b, const mhe_description *d, const int32_t
  * must not lose it in silence. Actuators do nothing unless they are driven. */
 static void note_uncarried(mhi_builder *b, const mhe_description *d) {
     if (d->n_bushings > 0) {
-        mhi_build_unsupported(b, 0, "%d BushingForces of the model: their forces are missing",
-                              (int)d->n_bushings);
+        mhi_build_unsupported(b, 0, "%d BushingForce%s: what it pulls is missing",
+                              (int)d->n_bushings, d->n_bushings == 1 ? "" : "s");
     }
     if (d->n_loops > 0) {
-        mhi_build_unsupported(b, 0, "%d loops of the model: nothing holds them together",
-                              (int)d->n_loops);
+        mhi_build_unsupported(
+            b, 0, "%d loop%s (PointConstraint, WeldConstraint) that nothing holds together",
+            (int)d->n_loops, d->n_loops == 1 ? "" : "s");
     }
     if (d->n_actuators > 0) {
         mhi_build_dropped(b, 0,
-                          "%d actuators of the model: not driven; residual torques do their work "
-                          "where bounds.residual_torques asks for them",
-                          (int)d->n_actuators);
+                          "%d actuator%s, not driven; residual torques do that work where "
+                          "bounds.residual_torques asks for them",
+                          (int)d->n_actuators, d->n_actuators == 1 ? "" : "s");
     }
 }
 
