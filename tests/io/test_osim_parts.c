@@ -193,7 +193,7 @@ static void wraps_in_their_order(void **state) {
     assert_true(second->size[0] == 0.02 && second->size[1] == 0.3 && second->p[2] == 3);
     assert_near(second->r[3], 1, 1e-15);
     assert_int_equal(path->wraps[1].first, -1);
-    assert_int_equal(d->n_unsupported + d->n_warnings > 3, 0);
+    assert_int_equal(d->n_unsupported, 0);
     mhi_description_free(d);
 }
 
@@ -358,7 +358,7 @@ static void forces_in_their_units(void **state) {
     assert_near(mhi_function_value(&d->ligaments[0].curve, 0.9985), 0, 1e-3);
     assert_true(d->bushings[0].body[1] == 1 && d->bushings[0].p[0][1] == 1);
     assert_near(d->bushings[0].r[1][3], sin(0.5), 1e-15);
-    assert_int_equal(d->n_dropped, 1);
+    assert_int_equal(d->n_dropped, 2); /* and the actuator */
     assert_non_null(strstr(d->dropped[0], "HuntCrossleyForce 'contact': contact and prescribed"));
     mhi_description_free(d);
 }

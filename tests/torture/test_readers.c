@@ -229,6 +229,7 @@ static void models(void **state) {
     torture_file(read_model, SOURCE "models/arm19/arm19.osim", NULL);
     torture_file(read_model, SOURCE "tests/fuzz/corpus/osim/v3.osim", NULL);
     torture_file(read_model, SOURCE "tests/fuzz/corpus/osim/v4.osim", NULL);
+    torture_file(read_model, SOURCE "tests/fuzz/corpus/osim/parts.osim", NULL);
     torture_file(read_model, SOURCE "tests/fuzz/corpus/biomod/arm.bioMod", NULL);
 }
 

@@ -112,21 +112,22 @@ static double *locked_at(mhi_builder *b, const mhe_description *d, const int32_t
 }
 
 /* What stands in the description but no plugin carries yet: whoever stops at what is unsupported
- * must not lose it in silence. */
+ * must not lose it in silence. Actuators do nothing unless they are driven. */
 static void note_uncarried(mhi_builder *b, const mhe_description *d) {
-    const struct {
-        const char *what;
-        int32_t n;
-    } forces[] = {
-        {"CoordinateLimitForce", d->n_limits}, {"path spring", d->n_path_springs},
-        {"ligament", d->n_ligaments},          {"SpringGeneralizedForce", d->n_coordinate_springs},
-        {"BushingForce", d->n_bushings},       {"actuator", d->n_actuators},
-        {"loop constraint", d->n_loops}};
-    for (size_t i = 0; i < sizeof forces / sizeof *forces; i++) {
-        if (forces[i].n > 0) {
-            mhi_build_unsupported(b, 0, "%d %s%s of the model: not carried yet", (int)forces[i].n,
-                                  forces[i].what, forces[i].n == 1 ? "" : "s");
-        }
+    if (d->n_bushings > 0) {
+        mhi_build_unsupported(b, 0, "%d BushingForce%s: what it pulls is missing",
+                              (int)d->n_bushings, d->n_bushings == 1 ? "" : "s");
+    }
+    if (d->n_loops > 0) {
+        mhi_build_unsupported(
+            b, 0, "%d loop%s (PointConstraint, WeldConstraint) that nothing holds together",
+            (int)d->n_loops, d->n_loops == 1 ? "" : "s");
+    }
+    if (d->n_actuators > 0) {
+        mhi_build_dropped(b, 0,
+                          "%d actuator%s, not driven; residual torques do that work where "
+                          "bounds.residual_torques asks for them",
+                          (int)d->n_actuators, d->n_actuators == 1 ? "" : "s");
     }
 }
 
