@@ -62,6 +62,16 @@ void mhi_system_point(const mhi_system *system, const double *x, const double *u
 /* Activations [n_m] of x and u; activation-driven and u NULL: NULL. */
 const double *mhi_system_activation(const mhi_system *system, const double *x, const double *u);
 
+/* Inputs of the forces that have them in a file, at time t (s); the others' entries of w [n_w] are
+ * left alone. [hot] */
+mhe_status mhi_system_inputs(const mhi_system *system, double t, double *w, mhe_error *err);
+/* Whether the input block `name` comes with the frames, not from a file. */
+int32_t mhi_system_input_is_measured(const mhi_system *system, const char *name);
+/* MHE_E_INPUT: the inputs of a force are not known from `first` to `last` (s): its file is shorter,
+ * or they have none and `measured` is 0. The message begins with "forces.<position>: ". [cold] */
+mhe_status mhi_system_covers(const mhi_system *system, double first, double last, int32_t measured,
+                             mhe_error *err);
+
 /* Memory for one thread; it is the `context` that mhe_system.acceleration takes. [cold] */
 typedef struct mhi_system_context mhi_system_context;
 mhe_status mhi_system_context_create(const mhi_system *system, mhi_system_context **context,

@@ -146,6 +146,9 @@ mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system,
                            .acceleration = mhi_system_acceleration,
                            .activation_rate = mhi_system_activation_rate};
     status = create_parts(s, setup, err);
+    if (status == MHE_OK) {
+        status = mhi_forces_check(s, err);
+    }
     if (status != MHE_OK) {
         mhi_system_free(s);
         return status;

@@ -14,11 +14,13 @@ typedef struct mhi_force {
     void *self;
     mhe_force_layout layout;
     const char *name;
+    int32_t position;    /* in the setup */
     int32_t first_input; /* in w */
 } mhi_force;
 
 struct mhi_system {
     mhe_system face;
+    mhe_host host; /* for force plugins: the setup's with services of our own */
     mhe_layout layout;
     const mhe_description *description;
     int32_t formulation;
@@ -31,7 +33,7 @@ struct mhi_system {
     int32_t *first, *end; /* [n_paths] coordinates that a path sees lie in [first, end) */
     int32_t *z_state;     /* [n_z] which of its muscle's states an entry of z is */
     mhi_force *forces;
-    int32_t n_forces, n_forces_created;
+    int32_t n_forces; /* that do something */
     int32_t most_inputs, most_paths, most_loads; /* of one force */
     mhi_arena arena;
 };
@@ -78,6 +80,8 @@ void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, doub
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
  * in other_q, other_v. Needs the kinematics of `at` in the context. */
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+/* Each is finite at the model's default posture; once the system is whole. */
+mhe_status mhi_forces_check(mhi_system *s, mhe_error *err);
 void mhi_forces_destroy(mhi_system *s);
 mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at,
                                int32_t derivatives, mhe_error *err);
