@@ -48,7 +48,8 @@ static point next_point(layers *l) {
     l->next = i + 1 == l->rig->n_points ? 0 : i + 1;
     const mhe_system *s = l->system;
     point p = {.x = l->rig->x + (ptrdiff_t)i * s->n_x, .u = l->rig->u + (ptrdiff_t)i * s->n_u};
-    mhi_system_point(mhi_estimator_system(l->rig->estimator), p.x, p.u, NULL, &p.at);
+    mhi_system_point(mhi_estimator_system(l->rig->estimator), p.x, p.u,
+                     mhi_ocp_input(mhi_estimator_ocp(l->rig->estimator), 0), &p.at);
     return p;
 }
 

@@ -22,9 +22,9 @@ static void keep_point(rig *r, const mhe_system *face, const mhe_estimate *e) {
     memcpy(x, e->q, n_q);
     memcpy(x + face->n_q, e->qdot, n_q);
     memcpy(u, e->excitation == NULL ? e->activation : e->excitation, n_m);
-    const mhe_block *activation = mhe_layout_find(face->layout, MHE_ROLE_STATE, "activation");
-    if (activation != NULL) {
-        memcpy(x + activation->first, e->activation, n_m);
+    if (mhi_system_equilibrium(mhi_ocp_context(mhi_estimator_ocp(r->estimator)), x, x + face->n_q,
+                               e->activation, x, NULL) != MHE_OK) {
+        return;
     }
     if (face->n_r > 0) {
         memcpy(u + face->n_m, e->residual, sizeof(double) * (size_t)face->n_r);
@@ -82,6 +82,11 @@ mhe_status rig_create(const variant *v, int32_t estimates, const mhe_host *loud,
     r->info.size = sizeof r->info;
     mhe_estimator_describe(r->estimator, &r->info);
     status = mhi_recording_read(v->run, mhi_system_description(system), loud, &r->recording, err);
+    if (status == MHE_OK && r->recording->n_frames > 0) {
+        const double *time = r->recording->time;
+        status = mhe_estimator_covers(r->estimator, time[0], time[r->recording->n_frames - 1], 0,
+                                      err);
+    }
     if (status != MHE_OK) {
         return status;
     }

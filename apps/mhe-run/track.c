@@ -49,8 +49,9 @@ static mhe_status open_live(tracking *t, mhe_error *err) {
 
 /* Before anything else: a folder that cannot be written to is told at once, not after the run. */
 static mhe_status claim_folder(tracking *t, mhe_error *err) {
-    static const char *const inputs[] = {"model.file",  "data.markers",   "data.emg",
-                                         "data.angles", "data.reference", "emg.mvc_file"};
+    static const char *const inputs[] = {"model.file",         "data.markers",   "data.emg",
+                                         "data.angles",        "data.reference", "emg.mvc_file",
+                                         "data.external_loads"};
     mhe_status status = mhe_outbox_open(t->setup->out, &t->outbox, err);
     if (status == MHE_OK) {
         status = mhe_outbox_claim(t->outbox, results_names, results_n_names, err);
@@ -124,6 +125,11 @@ static mhe_status open_all(tracking *t, mhe_error *err) {
     status = mhe_recording_open(s->config, &t->recording, err);
     if (status == MHE_OK) {
         status = mhe_recording_describe(t->recording, &t->summary.recording, err);
+    }
+    if (status == MHE_OK && t->summary.recording.n_frames > 0) {
+        const double *time = t->summary.recording.time;
+        status = mhe_estimator_covers(t->estimator, time[0],
+                                      time[t->summary.recording.n_frames - 1], 0, err);
     }
     if (status == MHE_OK) {
         status = start_as_known(t, err);

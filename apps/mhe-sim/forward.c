@@ -12,6 +12,7 @@ typedef struct forward {
     simulation simulation;
     mhi_table *excitations;
     int32_t *column; /* [n_m] */
+    mhe_estimator *estimator;
 } forward;
 
 static mhe_status open_excitations(forward *f, mhe_error *err) {
@@ -72,6 +73,9 @@ static mhe_status integrate(forward *f, mhe_error *err) {
     int32_t n = 0;
     mhe_status status = simulation_steps(s, e, &n, err);
     if (status == MHE_OK) {
+        status = mhe_estimator_covers(f->estimator, begin, begin + n / s->rate, 0, err);
+    }
+    if (status == MHE_OK) {
         status = controls_at(f, begin, err);
     }
     if (status == MHE_OK) {
@@ -92,10 +96,9 @@ static mhe_status integrate(forward *f, mhe_error *err) {
 
 mhe_status motion_forward(const motion_setup *setup, mhe_error *err) {
     forward f = {.setup = setup};
-    mhe_estimator *estimator = NULL;
-    mhe_status status = mhi_estimator_create(setup->run, setup->host, &estimator, err);
+    mhe_status status = mhi_estimator_create(setup->run, setup->host, &f.estimator, err);
     if (status == MHE_OK) {
-        status = simulation_open(&f.simulation, setup->run, mhi_estimator_system(estimator),
+        status = simulation_open(&f.simulation, setup->run, mhi_estimator_system(f.estimator),
                                  setup->host, setup->registry, setup->rate, err);
     }
     if (status == MHE_OK) {
@@ -112,6 +115,6 @@ mhe_status motion_forward(const motion_setup *setup, mhe_error *err) {
     }
     mhi_table_free(f.excitations);
     simulation_close(&f.simulation);
-    mhe_estimator_close(estimator);
+    mhe_estimator_close(f.estimator);
     return status;
 }

@@ -45,11 +45,12 @@ mhe_status simulation_open(simulation *s, const mhi_run *run, const mhi_system *
     s->x = MHI_TAKE(&s->arena, double, f->n_x);
     s->x_next = MHI_TAKE(&s->arena, double, f->n_x);
     s->u = MHI_TAKE(&s->arena, double, f->n_u);
+    s->w = MHI_TAKE(&s->arena, double, f->n_w);
     s->n_columns = f->n_q + f->n_q + 3 * f->n_m + f->n_z;
     s->row = MHI_TAKE(&s->arena, double, s->n_columns);
     s->marker = MHI_TAKE(&s->arena, double, 3 * d->n_markers);
     s->muscles = MHI_TAKE(&s->arena, const char *, f->n_m);
-    if (!s->x || !s->x_next || !s->u || !s->row || !s->marker || !s->muscles) {
+    if (!s->x || !s->x_next || !s->u || !s->w || !s->row || !s->marker || !s->muscles) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     s->activation = s->row + f->n_q + f->n_q;
@@ -170,7 +171,11 @@ mhe_status simulation_write(simulation *s, double time, mhe_error *err) {
 }
 
 mhe_status simulation_step(simulation *s, double time, mhe_error *err) {
-    mhe_status status = s->integrator->step(s->integrator_context, s->x, s->u, NULL, 1 / s->rate,
+    mhe_status status = mhi_system_inputs(s->system, time + 0.5 / s->rate, s->w, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    status = s->integrator->step(s->integrator_context, s->x, s->u, s->w, 1 / s->rate,
                                             NULL, s->x_next, NULL, err);
     if (status != MHE_OK) {
         const mhe_error why = *err;

@@ -17,7 +17,8 @@ typedef struct simulation {
     const mhi_system *system;
     double rate; /* Hz */
     int32_t n_q, n_m, n_x;
-    double *x, *u;        /* [n_x] state, [n_u] muscle controls, constant over a step */
+    double *x, *u, *w;    /* [n_x] state, [n_u] muscle controls and [n_w] inputs of forces, constant
+                           * over a step */
     const char **muscles; /* [n_m] names */
     mhi_system_context *context;
     const mhe_integrator_ops *integrator;

@@ -66,12 +66,14 @@ static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, i
                               int32_t derivatives, mhe_error *err) {
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_z = system->n_z;
+    int32_t n_p = system->n_p;
     mhe_acceleration out = {.size = sizeof out, .vdot = c->f + j * n_q};
     if (derivatives) {
         out.vdot_q = c->at->f_q + j * n_q * n_q;
         out.vdot_v = c->at->f_v + j * n_q * n_q;
         out.vdot_a = c->at->f_a + j * n_q * n_m;
         out.vdot_r = n_r > 0 ? c->at->f_r + j * n_q * n_r : NULL;
+        out.vdot_p = n_p > 0 ? c->at->f_p + j * n_q * n_p : NULL;
     }
     rk_stage(c, h, j);
     if (n_z == 0) {
@@ -86,6 +88,7 @@ static mhe_status rk_evaluate(struct rk_context *c, const double *r, double h, i
         out.zdot_a = system->n_a > 0 ? c->at->h_a + j * n_z : NULL;
         out.zdot_c = c->at->h_c + j * n_z;
         out.zdot_z = c->at->h_z + j * n_z * system->n_k;
+        out.zdot_p = n_p > 0 ? c->at->h_p + j * n_z * n_p : NULL;
     }
     return rk_accelerate(c, c->stage_q, c->stage_v, c->stage_a + j * n_m, c->Z + j * n_z, r, &out,
                          err);

@@ -25,6 +25,7 @@ int32_t rk_slot_size(const struct rk *rk) {
     int32_t s = rk->mechanics.stages, n = s * q;
     int32_t size = 1 + 2 * q + r + s * m + n + 2 * n * q + n * m + n * r + n * n + n;
     int32_t z = rk->system->n_z, k = rk->system->n_k;
+    size += (n + s * z) * rk->system->n_p;
     return z == 0 ? size
                   : size + z + m + s * z + n * z + s * z * (2 * q + 2 + k) + m * s * k * s * k +
                         s * z * n;
@@ -43,6 +44,8 @@ void rk_slot_at(const struct rk *rk, double *memory, struct rk_slot *out) {
     out->f_v = rk_take(&memory, n * q);
     out->f_a = rk_take(&memory, n * m);
     out->f_r = rk_take(&memory, n * r);
+    out->f_p = rk_take(&memory, n * rk->system->n_p);
+    out->h_p = rk_take(&memory, s * rk->system->n_z * rk->system->n_p);
     out->lu = rk_take(&memory, n * n);
     out->pivots = (int32_t *)(void *)rk_take(&memory, n);
     int32_t z = rk->system->n_z, k = rk->system->n_k;

@@ -20,7 +20,7 @@ static mhe_status rk_accepts(const mhe_system *system, const void *config, mhe_e
         return mhe_fail(err, MHE_E_UNSUPPORTED, "a muscle with %d states; at most %d are possible",
                         system->n_k, RK_MAX_STATES);
     }
-    return system->n_p > 0 ? mhe_fail(err, MHE_E_UNSUPPORTED, "it knows no parameters") : MHE_OK;
+    return MHE_OK;
 }
 
 static void rk_destroy(void *self) {
@@ -90,7 +90,7 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
     const mhe_system *system = rk->system;
     size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, pad = (size_t)rk->pad;
     size_t s = (size_t)rk->mechanics.stages;
-    size_t columns = (size_t)(system->n_x + system->n_u), n_z = (size_t)system->n_z;
+    size_t columns = (size_t)(system->n_x + system->n_u + system->n_p), n_z = (size_t)system->n_z;
     size_t wide = n_z > 0 ? columns : 0;
     double *slot, *trace;
     struct rk_context *c = calloc(1, sizeof *c);
@@ -216,6 +216,18 @@ static void rk_derivatives(const struct rk_context *c, double *A, double *B) {
     }
 }
 
+/* The same of the columns of the parameters; activations see none. */
+static void rk_parameters(const struct rk_context *c, double *P) {
+    const mhe_system *system = c->rk->system;
+    int32_t two = 2 * system->n_q, n_d = system->n_d, n_p = system->n_p;
+    size_t bytes = sizeof(double) * (size_t)n_p;
+    for (int32_t i = 0; i < two + system->n_z; i++) {
+        const double *row = c->sens + i * c->columns + system->n_x + system->n_u;
+        memcpy(P + (i < two ? i : i + n_d) * n_p, row, bytes);
+    }
+    memset(P + two * n_p, 0, bytes * (size_t)n_d);
+}
+
 static mhe_status rk_step(void *context, const double *x, const double *u, const double *w,
                           double dt, double *memory, double *x_next,
                           const mhe_step_derivatives *out, mhe_error *err) {
@@ -238,6 +250,9 @@ static mhe_status rk_step(void *context, const double *x, const double *u, const
     memcpy(x_next + 2 * n_q + system->n_d, c->z, sizeof(double) * (size_t)system->n_z);
     if (derivatives) {
         rk_derivatives(c, out->A, out->B);
+        if (out->P != NULL && system->n_p > 0) {
+            rk_parameters(c, out->P);
+        }
     }
     return MHE_OK;
 }

@@ -84,6 +84,7 @@ struct rk_slot {
     double *q, *v, *r, *stage_a;   /* [n_q], [n_q], [n_r], [s x n_m] its data */
     double *K;                     /* [s x n_q] the stages it found */
     double *f_q, *f_v, *f_a, *f_r; /* [s x ...] derivatives at the stages */
+    double *f_p, *h_p;             /* [s x n_q x n_p], [s x n_z x n_p] */
     double *lu;                    /* [s n_q x s n_q] LU of the stage equations */
     int32_t *pivots;               /* [s n_q] */
     /* where there are states z (states.c) */
@@ -140,7 +141,7 @@ struct rk_context {
     double *carry;             /* [2 n_q x 2 n_q] d(q+, v+)/d(q, v), transposed */
     double *row;               /* [n_m] */
     double *sens, *sens_next;  /* [2 n_q + n_z x columns]; the first alone where there is z */
-    int32_t columns;           /* n_x + n_u */
+    int32_t columns;           /* n_x + n_u + n_p */
 
     /* states z (states.c) */
     double *z;                        /* [n_z] now */

@@ -61,6 +61,8 @@ static void rk_direct(struct rk_context *c, int32_t i, double *next) {
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_d = system->n_d;
     double *by_a = next + 2 * n_q, *by_e = by_a + n_d, *by_r = by_e + n_m, *row = c->row;
+    double *by_p = by_r + n_r;
+    int32_t n_p = system->n_p;
     for (int32_t j = 0; j < c->rk->mechanics.stages; j++) {
         const double *stage_a_a = c->stage_a_a + j * n_m, *stage_a_e = c->stage_a_e + j * n_m;
         memset(row, 0, sizeof(double) * (size_t)n_m);
@@ -68,6 +70,9 @@ static void rk_direct(struct rk_context *c, int32_t i, double *next) {
             double w = c->adjoint[k * 2 * n_q + i];
             rk_add(row, w, c->at->f_a + k * n_m, n_m);
             rk_add(by_r, w, c->at->f_r + k * n_r, n_r);
+            if (n_p > 0) {
+                rk_add(by_p, w, c->at->f_p + k * n_p, n_p);
+            }
         }
         for (int32_t m = 0; m < n_d; m++) {
             by_a[m] += row[m] * stage_a_a[m];

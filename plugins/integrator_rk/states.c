@@ -294,6 +294,12 @@ CLONES static void rk_state_direct(struct rk_context *c, double h, int32_t j, do
             row[first_u + n_m + k] += f_r[k];
         }
     }
+    for (int32_t i = 0; i < n_q + n_z && system->n_p > 0; i++) {
+        int32_t n_p = system->n_p;
+        const double *by_p =
+            i < n_q ? at->f_p + (j * n_q + i) * n_p : at->h_p + (j * n_z + i - n_q) * n_p;
+        rk_add((i < n_q ? R + i * n : S + (i - n_q) * n) + first_u + system->n_u, 1, by_p, n_p);
+    }
     for (int32_t p = 0; p < n_z; p++) {
         int32_t m = system->z_muscle[p];
         double *row = S + p * n, h_a = system->n_a > 0 ? at->h_a[j * n_z + p] : 0;

@@ -8,15 +8,8 @@
 
 #include <math.h>
 
-/* The fibre of a muscle at a musculotendon length and velocity. */
-struct hill_fibre {
-    double n, n_l;       /* normalised length, its slope by L */
-    double s, s_l, s_w;  /* normalised velocity, its slopes by L and Ldot */
-    double pull, pull_l; /* share of the fibre force along the tendon */
-};
-
-static void hill_fibre_at(const struct hill_muscle *m, double l, double w,
-                          struct hill_fibre *fibre) {
+static inline void hill_fibre_here(const struct hill_muscle *m, double l, double w,
+                                   struct hill_fibre *fibre) {
     double along = l - m->l_slack;
     if (m->height == 0) {
         *fibre = (struct hill_fibre){.n = along * m->inv_cos * m->inverse,
@@ -40,6 +33,10 @@ static void hill_fibre_at(const struct hill_muscle *m, double l, double w,
     if (along <= 0) { /* a slack tendon: a pennate fibre cannot push */
         fibre->pull = fibre->pull_l = 0;
     }
+}
+
+void hill_fibre_at(const struct hill_muscle *m, double l, double w, struct hill_fibre *fibre) {
+    hill_fibre_here(m, l, w, fibre);
 }
 
 /* What reports want of one muscle. */
@@ -120,7 +117,7 @@ static void hill_force(const struct hill *hill, const mhe_muscle_point *at,
             hill_elastic_force(hill, i, at, out);
             continue;
         }
-        hill_fibre_at(m, l[i], w[i], &fibre);
+        hill_fibre_here(m, l[i], w[i], &fibre);
         m->curve(m, a[i], fibre.n, fibre.s, &value);
         double along = value.f + m->damping * fibre.s;
         double along_s = value.f_s + m->damping;
@@ -210,6 +207,9 @@ static mhe_status hill_evaluate(const void *self, const mhe_muscle_point *at,
         hill_zero(out->rate_s, n_s * n_s * n);
     }
     hill_force(hill, at, out);
+    if (out->force_p != NULL || out->rate_p != NULL) {
+        hill_by_parameters(hill, at, out);
+    }
     return out->rate == NULL && out->rate_e == NULL && out->rate_s == NULL
                ? MHE_OK
                : hill_diagonal_rate(self, HILL_ACTIVATION, at->excitation, at->state, out->rate,
@@ -230,6 +230,7 @@ static mhe_status hill_layout(const void *self, mhe_muscle_layout *out, mhe_erro
     out->lower = hill->lower;
     out->upper = hill->upper;
     out->present = hill->present;
+    out->n_parameters = hill_parameters(hill, &out->parameter_names);
     return MHE_OK;
 }
 

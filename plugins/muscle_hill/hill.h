@@ -112,6 +112,7 @@ extern const struct hill_curve_set *const hill_curve_sets[];
 /* An instance: the muscles in the order of the model. */
 struct hill {
     int32_t n, n_states;          /* 2 where a tendon is elastic */
+    int32_t unpublished;          /* muscles on sets whose curves hold lengths of their own */
     double smoothing;             /* b of the activation dynamics */
     double *rate_act;             /* 1 / tau_act, 1/s [n] */
     double *rate_deact;           /* 1 / tau_deact, 1/s [n] */
@@ -120,6 +121,20 @@ struct hill {
     double *lower, *upper;        /* [n_states x n] */
     uint8_t *present;             /* [n_states x n] */
 };
+
+/* parameters.c: derivatives by max_isometric_force, and where all muscles are on published sets by
+ * optimal_fiber_length and tendon_slack_length: n of them. Fills out->force_p and out->rate_p. */
+int32_t hill_parameters(const struct hill *hill, const char *const **names);
+void hill_by_parameters(const struct hill *hill, const mhe_muscle_point *at,
+                        const mhe_muscle_values *out);
+
+/* The fibre of a muscle with a rigid tendon at a musculotendon length and velocity. */
+struct hill_fibre {
+    double n, n_l;       /* normalised length, its slope by L */
+    double s, s_l, s_w;  /* normalised velocity, its slopes by L and Ldot */
+    double pull, pull_l; /* share of the fibre force along the tendon */
+};
+void hill_fibre_at(const struct hill_muscle *m, double l, double w, struct hill_fibre *fibre);
 
 extern const mhe_muscle_ops hill_ops;
 mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t n_muscles,

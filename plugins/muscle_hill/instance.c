@@ -188,6 +188,7 @@ static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *from
             return status;
         }
     }
+    hill->unpublished += !set->published;
     set->prepare(from, config, m);
     m->passive_scale *= config->passive;
     hill->rate_act[i] =

@@ -250,6 +250,11 @@ MHE_API void mhe_estimator_stop(mhe_estimator *estimator, int32_t stop);
 
 /* Fills `info` up to its size. [cold] */
 MHE_API mhe_status mhe_estimator_describe(const mhe_estimator *estimator, mhe_estimator_info *info);
+/* Whether the inputs of all forces are known from `first` to `last` (s): those in files as far as
+ * they go, others where `measured` says that they will come with the frames. MHE_E_INPUT: one is
+ * not, "file:line: what". [cold] */
+MHE_API mhe_status mhe_estimator_covers(const mhe_estimator *estimator, double first, double last,
+                                        int32_t measured, mhe_error *err);
 /* Row of the table with this name; -1: there is none. [any] */
 MHE_API int32_t mhe_estimator_find_channel(const mhe_estimator *estimator, const char *name);
 /* Fills `counts` of a channel up to its size. [cold] */

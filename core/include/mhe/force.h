@@ -76,11 +76,35 @@ typedef struct mhe_force_ops {
     mhe_status (*evaluate)(const void *self, const mhe_force_point *at, const mhe_force_values *out,
                            mhe_error *err);
     /* For plugins whose inputs stand in a file: their values [n_w] at time t (s), NaN where the
-     * file has none; and the times that it covers. Both NULL: inputs come with the frames. [cold]
-     */
+     * file has none; and the times that it covers. Both NULL: inputs come with the frames. Over an
+     * interval the inputs of its middle hold; those that come with frames, of its first node.
+     * input() is [hot], covers() [cold]. */
     mhe_status (*input)(const void *self, double t, double *w, mhe_error *err);
     mhe_status (*covers)(const void *self, double *first, double *last, mhe_error *err);
 } mhe_force_ops;
+
+/* Service of the host (mhe_host.service) for force plugins: OpenSim's ExternalLoads, read. */
+#define MHE_EXTERNAL_LOADS_SERVICE "mhe.external-loads/1"
+
+/* What a file of loads says, on its own times. */
+typedef struct mhe_external_loads {
+    uint32_t size;
+    int32_t n_loads, n_rows;
+    const char *const *names; /* [n_loads] */
+    const mhe_load *loads;    /* [n_loads] */
+    const double *time;       /* [n_rows], s, increasing */
+    const double *values;     /* [n_rows x n_loads x 9] force N, point m, torque N m; finite */
+} mhe_external_loads;
+
+typedef struct mhe_external_loads_service {
+    uint32_t size;
+    /* Reads an ExternalLoads .xml and the .mot or .sto that it names, for the bodies of
+     * `description`. Loads that are switched off are left out. MHE_E_INPUT: "file:line: what": not
+     * readable, an unknown body, a missing column, a missing value. [cold] */
+    mhe_status (*read)(const char *path, const mhe_description *description,
+                       const mhe_external_loads **loads, mhe_error *err);
+    void (*free)(const mhe_external_loads *loads); /* NULL is fine. [cold] */
+} mhe_external_loads_service;
 
 #ifdef __cplusplus
 }

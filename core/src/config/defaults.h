@@ -12,4 +12,9 @@
 mhe_status mhi_default_plugin(const char *section, mhi_arena *arena, const char **id,
                               mhe_error *err);
 
+/* The same of what is a list: "forces", those that act where a configuration has none.
+ * "external_loads" is what reads data.external_loads. n 0: none. */
+mhe_status mhi_default_plugins(const char *name, mhi_arena *arena, const char ***ids, int32_t *n,
+                               mhe_error *err);
+
 #endif

@@ -251,6 +251,71 @@ static mhe_status read_costs(const struct reader *r, const mhi_node *owner, cons
     return status;
 }
 
+/* A use that no list of the file holds: with its defaults, and `file` for its key of that name. */
+static mhe_status read_other_force(const struct reader *r, const mhi_section *section,
+                                   const char *id, const char *file, const mhi_node *node,
+                                   mhi_use *use) {
+    mhi_run *run = r->run;
+    const mhe_plugin *plugin = NULL;
+    mhe_error why = {0};
+    mhe_status status = mhi_registry_find(r->registry, id, section->iface, &plugin, &why);
+    if (status != MHE_OK) {
+        return mhi_fail_at(r->err, status, run->tree, node, "%s: %s", section->name, why.text);
+    }
+    void *config = mhi_arena_take(&run->arena, plugin->config_size);
+    if (config == NULL) {
+        return no_memory(r);
+    }
+    for (uint32_t i = 0; i < plugin->option_count && file != NULL; i++) {
+        if (strcmp(plugin->options[i].key, "file") == 0) {
+            memcpy((char *)config + plugin->options[i].offset, &file, sizeof file);
+        }
+    }
+    if (file == NULL) {
+        status = mhi_options_fill(plugin->options, (int32_t)plugin->option_count, run->tree, NULL,
+                                  NULL, 0, plugin->id, run->dir, &run->arena, config, r->err);
+    }
+    *use = (mhi_use){.plugin = plugin, .config = config, .node = node};
+    return status;
+}
+
+/* The list, or where there is none what acts by default as far as it is installed; then
+ * data.external_loads. */
+static mhe_status read_forces(const struct reader *r, const mhi_section *section,
+                              const mhi_node *list) {
+    mhi_run *run = r->run;
+    const char **ids = NULL;
+    int32_t n = 0;
+    mhe_status status = read_list(r, section, NULL, list, &run->forces);
+    if (status == MHE_OK && list == NULL) {
+        status = mhi_default_plugins("forces", &run->arena, &ids, &n, r->err);
+        run->forces.uses = MHI_TAKE(&run->arena, mhi_use, n);
+        if (run->forces.uses == NULL) {
+            return no_memory(r);
+        }
+    }
+    for (int32_t i = 0; i < n && status == MHE_OK; i++) {
+        const mhe_plugin *plugin = NULL;
+        if (mhi_registry_find(r->registry, ids[i], section->iface, &plugin, NULL) == MHE_OK) {
+            status = read_other_force(r, section, ids[i], NULL, NULL,
+                                      &run->forces.uses[run->forces.n++]);
+        }
+    }
+    if (status != MHE_OK || run->data.external_loads == NULL) {
+        return status;
+    }
+    const mhi_node *data = section_node(run, "data");
+    const mhi_node *key = data == NULL ? NULL : mhi_node_find(data, "external_loads");
+    status = mhi_default_plugins("external_loads", &run->arena, &ids, &n, r->err);
+    if (status == MHE_OK && n == 0) {
+        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, key,
+                           "data.external_loads: defaults.yaml names no plugin that reads it");
+    }
+    return status != MHE_OK ? status
+                            : read_other_force(r, section, ids[0], run->data.external_loads, key,
+                                               &run->external_loads);
+}
+
 static mhe_status read_plugin_section(const struct reader *r, const mhi_section *s) {
     mhi_run *run = r->run;
     const mhi_node *node = section_node(run, s->name);
@@ -259,6 +324,9 @@ static mhe_status read_plugin_section(const struct reader *r, const mhi_section 
                                        : read_costs(r, NULL, node, &run->costs, &run->n_costs);
     }
     void *part = (unsigned char *)run + s->offset;
+    if (part == &run->forces) {
+        return read_forces(r, s, node);
+    }
     if (s->list) {
         return read_list(r, s, NULL, node, part);
     }

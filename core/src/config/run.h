@@ -40,6 +40,7 @@ typedef struct mhi_model_section {
 
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
+    const char *external_loads;            /* .xml */
     const char *angles;                    /* .sto .mot */
     double emg_offset;                     /* s, added to the EMG file's times */
     int32_t emg_delay;      /* frames by which the tracked EMG lags: activation-driven default 2,
@@ -131,9 +132,11 @@ typedef struct mhi_run {
     mhi_use model, muscle, integrator, solver;
     mhi_use *costs;
     int32_t n_costs;
+    mhi_use_list forces;         /* those of the list, or those by default */
+    mhi_use external_loads;      /* data.external_loads; plugin NULL: none */
     mhi_use_list sources, sinks; /* of live runs */
-    int32_t formulation;       /* MHE_FORMULATION_* */
-    mhe_text_list plugin_path; /* absolute folders */
+    int32_t formulation;         /* MHE_FORMULATION_* */
+    mhe_text_list plugin_path;   /* absolute folders */
     mhi_model_section model_file;
     mhi_data_section data;
     mhi_transform_section transform; /* data.transform */
@@ -154,8 +157,8 @@ typedef struct mhi_section {
     const char *iface; /* of the plugin that the section names (its options are keys too); NULL */
     const mhe_option *options;
     int32_t n_options;
-    uint32_t offset; /* in mhi_run: the section's struct or, with iface, its mhi_use; with `list` its
-                      * mhi_use_list; 0 for "" and costs */
+    uint32_t offset; /* in mhi_run: the section's struct or, with iface, its mhi_use; with `list`
+                      * its mhi_use_list; 0 for "" and costs */
     int32_t list;    /* 1: a list of plugins; 2: one that may not be empty */
 } mhi_section;
 

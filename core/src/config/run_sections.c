@@ -4,6 +4,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <mhe/force.h>
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
@@ -39,6 +40,10 @@ static const mhe_option muscle_options[] = {
     MHE_OPT_TEXT(mhi_use_section, plugin, 0, NULL, "Plugin of the muscles."),
 };
 
+static const mhe_option force_options[] = {
+    MHE_OPT_TEXT(mhi_use_section, plugin, 0, NULL, "Plugin of the force."),
+};
+
 static const mhe_option data_options[] = {
     MHE_OPT_PATH(mhi_data_section, markers, 0, "Measured markers, .trc or .c3d."),
     MHE_OPT_PATH(mhi_data_section, emg, 0,
@@ -48,6 +53,9 @@ static const mhe_option data_options[] = {
     MHE_OPT_PATH(mhi_data_section, angles, 0,
                  "Measured joint angles, .sto or .mot, a column a coordinate: what the signal q is "
                  "to be close to where a cost compares it, beside markers or in their place."),
+    MHE_OPT_PATH(mhi_data_section, external_loads, 0,
+                 "Forces and torques that act on bodies, OpenSim's ExternalLoads (.xml with its "
+                 ".mot or .sto): short for a force that reads it."),
     MHE_OPT_PATH(mhi_data_section, reference, 0,
                  "Known motion to start from and to compare with, .sto."),
     MHE_OPT_REAL(mhi_data_section, emg_offset, 0, -1e6, 1e6, "s",
@@ -218,6 +226,10 @@ static const mhi_section sections[] = {
             AT(model)),
     SECTION("muscle", "Forces and activation dynamics of the muscles.", MHE_MUSCLE_IFACE,
             muscle_options, AT(muscle)),
+    LIST("forces",
+         "A list: what acts beside muscles; left out, what the model file states of coordinate "
+         "limits, springs and ligaments; []: nothing.",
+         MHE_FORCE_IFACE, force_options, AT(forces), 1),
     SECTION("data", "Measured motion.", NULL, data_options, AT(data)),
     SECTION(
         "data.transform",

@@ -4,6 +4,7 @@
 #include "config/run.h"
 #include "config/run_sections.h"
 
+#include <mhe/force.h>
 #include <mhe/model.h>
 #include <string.h>
 
@@ -65,6 +66,9 @@ void mhi_run_write(const mhi_run *run, mhi_text *out) {
             continue;
         }
         if (s->list && mhi_run_list(run, s).n == 0) {
+            if (strcmp(s->iface, MHE_FORCE_IFACE) == 0) { /* left out would mean the default */
+                mhi_text_add(out, "%s: []\n", s->name);
+            }
             continue;
         }
         mhi_text_add(out, "%s:\n", s->name);

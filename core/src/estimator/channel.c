@@ -93,6 +93,33 @@ static mhe_status create_row(const row_setup *s, const mhi_ocp *ocp, const mhe_d
     return status == MHE_OK ? take_rows(c, nodes, arena, err) : status;
 }
 
+static int32_t is_measured(const mhi_ocp *ocp, const mhe_block *block) {
+    return block->role == MHE_ROLE_INPUT &&
+           mhi_system_input_is_measured(mhi_ocp_system(ocp), block->name);
+}
+
+/* An input block of a force that comes with the frames. */
+static mhe_status create_input(const mhe_block *b, int32_t nodes, mhi_arena *arena, mhi_channel *c,
+                               mhe_error *err) {
+    *c = (mhi_channel){.face = {.size = sizeof c->face,
+                                .kind = MHE_CHANNEL_INPUT,
+                                .name = b->name,
+                                .width = b->count,
+                                .n_labels = b->count,
+                                .per_label = 1,
+                                .labels = b->entry_names,
+                                .columns = b->entry_names,
+                                .units = b->units,
+                                .gap_rule = MHE_GAP_HOLD},
+                       .signal = -1,
+                       .input = b->first,
+                       .trust = MHI_TRUST_ALL,
+                       .read = 1,
+                       .gap_nodes = 2,
+                       .counts = {.size = sizeof c->counts}};
+    return take_rows(c, nodes, arena, err);
+}
+
 mhe_status mhi_channels_create(const mhi_run *run, const mhi_ocp *ocp, const mhe_description *d,
                                int32_t nodes, mhi_arena *arena, mhi_channels *channels,
                                mhe_error *err) {
@@ -105,7 +132,11 @@ mhe_status mhi_channels_create(const mhi_run *run, const mhi_ocp *ocp, const mhe
                                  run->data.emg_delay, p->n_muscles, 1, p->muscle_names},
                                 {"angles", MHI_SIGNAL_Q, 1, MHI_TRUST_ALL, MHE_GAP_LINEAR, 2, 0,
                                  p->n_q, 1, p->coordinate_names}};
-    const int32_t n = (int32_t)(sizeof setups / sizeof setups[0]);
+    const int32_t n_targets = (int32_t)(sizeof setups / sizeof setups[0]);
+    int32_t n = n_targets;
+    for (int32_t b = 0; b < p->layout->n_blocks; b++) {
+        n += is_measured(ocp, mhe_layout_at(p->layout, b));
+    }
     *channels = (mhi_channels){.n = n,
                                .nodes = nodes,
                                .rows = MHI_TAKE(arena, mhi_channel, n),
@@ -115,8 +146,16 @@ mhe_status mhi_channels_create(const mhi_run *run, const mhi_ocp *ocp, const mhe
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     mhe_status status = MHE_OK;
-    for (int32_t i = 0; i < n && status == MHE_OK; i++) {
+    for (int32_t i = 0; i < n_targets && status == MHE_OK; i++) {
         status = create_row(&setups[i], ocp, d, nodes, arena, &channels->rows[i], err);
+    }
+    for (int32_t b = 0, i = n_targets; b < p->layout->n_blocks && status == MHE_OK; b++) {
+        const mhe_block *block = mhe_layout_at(p->layout, b);
+        if (is_measured(ocp, block)) {
+            status = create_input(block, nodes, arena, &channels->rows[i++], err);
+        }
+    }
+    for (int32_t i = 0; i < n; i++) {
         channels->faces[i] = channels->rows[i].face;
     }
     return status;

@@ -21,7 +21,8 @@
 
 typedef struct mhi_channel {
     mhe_channel face;
-    int32_t signal;    /* MHI_SIGNAL_* that it is the target of */
+    int32_t signal;    /* MHI_SIGNAL_* that it is the target of; -1: an input of a force */
+    int32_t input;     /* place in the system's inputs */
     int32_t posture;   /* it tells how the body stands */
     int32_t trust;     /* MHI_TRUST_* */
     int32_t read;      /* a cost reads the signal */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* estimator.c: the public estimator: frames in, estimates out. */
+#include "base/need.h"
 #include "estimator/estimator_private.h"
 #include "io/model_file.h"
 #include "model/bounds.h"
@@ -45,12 +46,25 @@ static mhe_status locate(const mhi_run *run, mhe_status status, mhe_error *err) 
         found = &run->costs[err->entry];
     } else if (err->part > MHE_PART_NONE && err->part <= MHE_PART_SOLVER) {
         found = parts[err->part];
+    } else if (err->part == MHE_PART_FORCE && err->entry >= 0 && err->entry <= run->forces.n) {
+        found = err->entry == run->forces.n ? &run->external_loads : &run->forces.uses[err->entry];
+        found = found->node != NULL ? found : NULL; /* of one by default */
     }
     if (found == NULL) {
         return status;
     }
     const mhe_error why = *err;
     return mhi_fail_at(err, status, run->tree, found->node, "%s", why.text);
+}
+
+mhe_status mhe_estimator_covers(const mhe_estimator *e, double first, double last, int32_t measured,
+                                mhe_error *err) {
+    mhe_status status = MHI_NEED(err, {"estimator", e});
+    if (status == MHE_OK) {
+        status = mhi_system_covers(e->system, first, last, measured, err);
+        status = status == MHE_OK ? MHE_OK : locate(e->run, status, err);
+    }
+    return status;
 }
 
 static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
@@ -60,6 +74,15 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     if (status != MHE_OK) {
         return status;
     }
+    const int32_t n_forces = run->forces.n + (run->external_loads.plugin != NULL);
+    mhi_force_setup *forces = MHI_TAKE(&e->arena, mhi_force_setup, n_forces);
+    if (forces == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < n_forces; i++) {
+        const mhi_use *use = i < run->forces.n ? &run->forces.uses[i] : &run->external_loads;
+        forces[i] = (mhi_force_setup){use->plugin, use->config};
+    }
     const mhi_system_setup system = {.host = e->host,
                                      .description = e->description,
                                      .model = run->model.plugin,
@@ -68,6 +91,8 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
                                      .muscle_config = run->muscle.config,
                                      .formulation = run->formulation,
                                      .residual_torques = run->bounds.residual_torques,
+                                     .forces = forces,
+                                     .n_forces = n_forces,
                                      .bounds = &bounds};
     status = mhi_system_create(&system, &e->system, err);
     if (status != MHE_OK) {

@@ -37,8 +37,9 @@ static void predict(mhe_estimator *e) {
     take_back_guess(e);
     for (int32_t k = 0; k < e->window.n; k++) {
         double *next = mhi_row(e->window.solution.x, k + 1, e->window.n_x);
-        mhe_status status = mhi_ocp_predict(e->ocp, mhi_row(e->window.solution.x, k, e->window.n_x),
-                                            mhi_row(e->window.solution.u, k, e->n_u), next, NULL);
+        mhe_status status =
+            mhi_ocp_predict(e->ocp, k, mhi_row(e->window.solution.x, k, e->window.n_x),
+                            mhi_row(e->window.solution.u, k, e->n_u), next, NULL);
         if (status != MHE_OK || !all_finite(next, e->window.n_x)) {
             memcpy(next, mhi_row(e->window.guess_x, k + 1, e->window.n_x),
                    sizeof(double) * (size_t)e->window.n_x);

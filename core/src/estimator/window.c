@@ -93,7 +93,8 @@ void mhi_window_set_targets(mhe_estimator *e) {
         mhi_ocp_set_time(e->ocp, k, e->window.times[k]);
         for (int32_t i = 0; i < e->channels.n; i++) {
             const mhi_channel *c = &e->channels.rows[i];
-            double *target = mhi_ocp_target(e->ocp, c->signal, k);
+            double *target = c->signal < 0 ? mhi_ocp_input(e->ocp, k) + c->input
+                                           : mhi_ocp_target(e->ocp, c->signal, k);
             if (target != NULL) {
                 memcpy(target, mhi_row(c->believed, k, c->face.width),
                        sizeof(double) * (size_t)c->face.width);
@@ -107,7 +108,7 @@ static void extend(mhe_estimator *e) {
     double *x = mhi_row(e->window.solution.x, e->window.n, e->window.n_x);
     const double *before = mhi_row(e->window.solution.x, e->window.n - 1, e->window.n_x);
     const double *u = mhi_row(e->window.solution.u, e->window.n - 1, e->n_u);
-    mhe_status status = mhi_ocp_predict(e->ocp, before, u, x, NULL);
+    mhe_status status = mhi_ocp_predict(e->ocp, e->window.n - 1, before, u, x, NULL);
     for (int32_t i = 0; i < e->window.n_x; i++) { /* with what is carried */
         const double value = status == MHE_OK && isfinite(x[i]) ? x[i] : before[i];
         x[i] = mhi_clip(value, mhi_ocp_x_lower(e->ocp, e->window.n)[i],

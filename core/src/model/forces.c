@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* forces.c: the force plugins of a system. */
+#include "io/external_loads.h"
 #include "model/system_private.h"
 #include "plugin/instance.h"
 
@@ -44,39 +45,137 @@ static mhe_status check_layout(const mhi_force *f, const mhi_system *s, mhe_erro
                : MHE_OK;
 }
 
+/* The host that force plugins see: the application's, and what the core reads for them. */
+static void pass_log(const mhe_host *host, int32_t level, const char *text) {
+    const mhe_host *outer = host->data;
+    outer->log(outer, level, text);
+}
+
+static const void *service(const mhe_host *host, const char *id) {
+    const mhe_host *outer = host->data;
+    return strcmp(id, MHE_EXTERNAL_LOADS_SERVICE) == 0 ? &mhi_external_loads
+                                                       : outer->service(outer, id);
+}
+
+static mhe_status create_one(mhi_system *s, const mhi_force_setup *setup, mhi_force *f,
+                             mhe_error *err) {
+    f->plugin = setup->plugin;
+    f->ops = f->plugin->ops;
+    mhe_status status = mhi_force_create(f->plugin, &s->host, s->description, setup->config,
+                                         &f->self, &f->layout, err);
+    if (status == MHE_OK) {
+        status = check_layout(f, s, err);
+    }
+    f->name = f->layout.name != NULL ? f->layout.name : f->plugin->id;
+    for (int32_t i = 0; i < s->n_forces && status == MHE_OK && f->layout.n_inputs > 0; i++) {
+        if (s->forces[i].layout.n_inputs > 0 && strcmp(s->forces[i].name, f->name) == 0) {
+            return mhe_fail(err, MHE_E_CONFIG, "%s: a force before it has inputs named '%s' too",
+                            f->plugin->id, f->name);
+        }
+    }
+    return status;
+}
+
+static int32_t acts(const mhe_force_layout *l) {
+    return l->generalised || l->n_paths > 0 || l->n_loads > 0;
+}
+
+/* "forces.<position>: " before what a plugin says. */
+static mhe_status placed(int32_t position, mhe_status status, mhe_error *err) {
+    if (status == MHE_OK || err == NULL) {
+        return status;
+    }
+    const mhe_error why = *err;
+    err->part = MHE_PART_FORCE;
+    err->entry = position;
+    return mhe_fail(err, status, "forces.%d: %.700s", (int)position, why.text);
+}
+
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err) {
+    s->host = (mhe_host){.size = sizeof s->host,
+                         .data = (void *)(uintptr_t)setup->host,
+                         .log = pass_log,
+                         .service = service};
     s->forces = MHI_TAKE(&s->arena, mhi_force, setup->n_forces);
     if (s->forces == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
-    s->n_forces = setup->n_forces;
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < setup->n_forces && status == MHE_OK; i++) {
-        mhi_force *f = &s->forces[i];
-        f->plugin = setup->forces[i].plugin;
-        f->ops = f->plugin->ops;
-        status = mhi_force_create(f->plugin, setup->host, s->description, setup->forces[i].config,
-                                  &f->self, &f->layout, err);
-        s->n_forces_created = i + 1;
-        if (status == MHE_OK) {
-            status = check_layout(f, s, err);
+        mhi_force *f = &s->forces[s->n_forces];
+        *f = (mhi_force){.position = i, .first_input = s->face.n_w};
+        status = placed(i, create_one(s, &setup->forces[i], f, err), err);
+        if (f->self != NULL && (status != MHE_OK || !acts(&f->layout))) {
+            f->ops->destroy(f->self);
+            continue;
         }
-        f->name = f->layout.name != NULL ? f->layout.name : f->plugin->id;
-        f->first_input = s->face.n_w;
-        s->face.n_w += f->layout.n_inputs;
-        s->most_inputs = larger(s->most_inputs, f->layout.n_inputs);
-        s->most_paths = larger(s->most_paths, f->layout.n_paths);
-        s->most_loads = larger(s->most_loads, f->layout.n_loads);
+        if (status == MHE_OK) {
+            s->n_forces++;
+            s->face.n_w += f->layout.n_inputs;
+            s->most_paths = larger(s->most_paths, f->layout.n_paths);
+            s->most_loads = larger(s->most_loads, f->layout.n_loads);
+        }
     }
     return status;
 }
 
 void mhi_forces_destroy(mhi_system *s) {
-    for (int32_t i = 0; i < s->n_forces_created; i++) {
-        if (s->forces[i].self != NULL) {
-            s->forces[i].ops->destroy(s->forces[i].self);
+    for (int32_t i = 0; i < s->n_forces; i++) {
+        s->forces[i].ops->destroy(s->forces[i].self);
+    }
+}
+
+mhe_status mhi_system_inputs(const mhi_system *s, double t, double *w, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
+        const mhi_force *f = &s->forces[i];
+        if (f->layout.n_inputs > 0 && f->ops->input != NULL) {
+            status = f->ops->input(f->self, t, w + f->first_input, err);
         }
     }
+    return status;
+}
+
+int32_t mhi_system_input_is_measured(const mhi_system *s, const char *name) {
+    for (int32_t i = 0; i < s->n_forces; i++) {
+        if (s->forces[i].layout.n_inputs > 0 && strcmp(s->forces[i].name, name) == 0) {
+            return s->forces[i].ops->input == NULL;
+        }
+    }
+    return 0;
+}
+
+/* Times are printed with so many digits. */
+#define COVER_SLACK 2e-3
+
+mhe_status mhi_system_covers(const mhi_system *s, double first, double last, int32_t measured,
+                             mhe_error *err) {
+    for (int32_t i = 0; i < s->n_forces; i++) {
+        const mhi_force *f = &s->forces[i];
+        double from = first, to = last;
+        mhe_status status = MHE_OK;
+        if (f->layout.n_inputs == 0 || (measured && f->ops->input == NULL)) {
+            continue;
+        }
+        if (f->ops->input == NULL) {
+            status = mhe_fail(err, MHE_E_INPUT,
+                              "%s: its %d inputs ('%s' ...) come with the frames, and there are no "
+                              "data for them",
+                              f->plugin->id, (int)f->layout.n_inputs, f->layout.input_names[0]);
+        } else {
+            status = f->ops->covers(f->self, &from, &to, err);
+        }
+        if (status == MHE_OK && (from > first + COVER_SLACK || to < last - COVER_SLACK)) {
+            status = mhe_fail(err, MHE_E_INPUT,
+                              "%s: its inputs are known from %g to %g s, the motion is from %g to "
+                              "%g s",
+                              f->plugin->id, from, to, first, last);
+        }
+        if (status != MHE_OK) {
+            return placed(f->position, status, err);
+        }
+    }
+    return MHE_OK;
 }
 
 static void zero(double *values, int32_t n) {
@@ -134,13 +233,13 @@ static mhe_status evaluate_one(mhi_system_context *c, const mhi_force *f,
         zero(c->load, 9 * l->n_loads);
     }
     if (l->n_inputs > 0 && at->w == NULL) {
-        return mhe_fail(err, MHE_E_INPUT, "%s: no inputs are known here", f->name);
+        return mhe_fail(err, MHE_E_INPUT, "%s: no inputs are known here", f->plugin->id);
     }
     mhe_status status = f->ops->evaluate(f->self, &point, &out, err);
     const int finite = (!l->generalised || all_finite(c->own, n_q)) &&
                        all_finite(c->tension, l->n_paths) && all_finite(c->load, 9 * l->n_loads);
     return status == MHE_OK && !finite
-               ? mhe_fail(err, MHE_RETRY, "%s: a force is not finite", f->name)
+               ? mhe_fail(err, MHE_RETRY, "%s: a force is not finite", f->plugin->id)
                : status;
 }
 
@@ -182,5 +281,44 @@ mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at
             status = add_one(c, &s->forces[i], derivatives, err);
         }
     }
+    return status;
+}
+
+mhe_status mhi_forces_check(mhi_system *s, mhe_error *err) {
+    const mhe_description *d = s->description;
+    const int32_t n_q = s->face.n_q;
+    mhi_system_context *c = NULL;
+    mhi_arena arena = {0};
+    double *q = MHI_TAKE(&arena, double, n_q), *v = MHI_TAKE(&arena, double, n_q);
+    double *w = MHI_TAKE(&arena, double, s->face.n_w);
+    if (s->n_forces == 0 || !q || !v || !w) {
+        mhi_arena_free(&arena);
+        return s->n_forces == 0 ? MHE_OK : mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < n_q; i++) {
+        q[i] = d->coordinates[i].value;
+    }
+    mhe_status status = mhi_system_context_create(s, &c, err);
+    const mhe_system_point at = {.size = sizeof at, .q = q, .v = v, .w = w};
+    if (status == MHE_OK) {
+        const mhe_kinematics out = {
+            .size = sizeof out, .length = c->length, .length_q = c->length_q};
+        status = s->model->kinematics(c->model, q, v, &out, err);
+    }
+    for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
+        const mhi_force *f = &s->forces[i];
+        double from = 0, to = 0;
+        if (f->layout.n_inputs > 0 && f->ops->input != NULL) {
+            status = f->ops->covers(f->self, &from, &to, err);
+            status =
+                status == MHE_OK ? f->ops->input(f->self, from, w + f->first_input, err) : status;
+        }
+        if (status == MHE_OK) {
+            status = evaluate_one(c, f, &at, 0, err);
+        }
+        status = placed(f->position, status > 0 ? MHE_E_PLUGIN : status, err);
+    }
+    mhi_system_context_free(c);
+    mhi_arena_free(&arena);
     return status;
 }

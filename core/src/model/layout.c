@@ -239,6 +239,28 @@ static int inputs(maker *m) {
     return 1;
 }
 
+static int parameters(maker *m) {
+    mhi_system *s = m->s;
+    const int32_t n_m = s->face.n_m;
+    for (int32_t i = 0; i < s->n_parameters; i++) {
+        entries e;
+        if (!begin(m, m->setup->parameters[i], MHE_ROLE_PARAMETER, MHE_STRUCTURE_CONSTANT, n_m,
+                   &e)) {
+            return 0;
+        }
+        for (int32_t k = 0; k < n_m; k++) {
+            double value = 0;
+            memcpy(&value, (const char *)&s->muscles[k] + s->parameter_at[i], sizeof value);
+            e.names[k] = s->muscles[k].name;
+            e.units[k] = mhi_parameter_unit(s, i);
+            e.owner[k] = k;
+            e.lower[k] = 0;
+            e.scale[k] = value > 0 ? value : 1;
+        }
+    }
+    return 1;
+}
+
 /* Whose the entries of z are, and where those of a muscle stand. */
 static mhe_status index_z(mhi_system *s, mhe_error *err) {
     const int32_t n_z = s->face.n_z, n_m = s->face.n_m;
@@ -281,8 +303,9 @@ mhe_status mhi_layout_make(mhi_system *s, const mhi_system_setup *setup, mhe_err
     s->n_s = n_s;
     s->activation = s->muscle_layout.activation;
     s->z_state = MHI_TAKE(&s->arena, int32_t, n_s * s->face.n_m);
-    m.blocks = MHI_TAKE(&s->arena, mhe_block, 8 + n_s + s->n_forces);
-    if (s->z_state == NULL || m.blocks == NULL || !states(&m) || !controls(&m) || !inputs(&m)) {
+    m.blocks = MHI_TAKE(&s->arena, mhe_block, 8 + n_s + s->n_forces + s->n_parameters);
+    if (s->z_state == NULL || m.blocks == NULL || !states(&m) || !controls(&m) || !inputs(&m) ||
+        !parameters(&m)) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     s->layout = (mhe_layout){.size = sizeof s->layout,

@@ -100,6 +100,10 @@ static mhe_status muscles(mhi_system_context *c, const mhe_system_point *at, int
         out.force_l = c->force_l;
         out.force_w = c->force_w;
     }
+    if (derivatives && s->n_parameters > 0) {
+        out.force_p = c->all_force_p;
+        out.rate_p = rates ? c->all_rate_p : NULL;
+    }
     if (rates) {
         out.rate = c->rate;
     }
@@ -129,6 +133,9 @@ static void muscle_derivatives(mhi_system_context *c) {
         mhi_path_moment_derivatives(c, m, c->force[m], c->force_l[m], c->force_w[m],
                                     c->force_q + m * n_q, c->force_v + m * n_q, c->moment_q,
                                     c->moment_v);
+    }
+    if (s->n_parameters > 0) {
+        mhi_parameters_forces(c);
     }
     for (int32_t i = 0; i < s->face.n_z; i++) {
         c->force_z[i] = c->force_s[s->z_state[i] * n_m + s->face.z_muscle[i]];
@@ -228,6 +235,10 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
     if (out->vdot_z != NULL && f->n_z > 0) {
         acceleration_by_force(c, c->force_z, f->z_muscle, f->n_z, out->vdot_z);
     }
+    if (out->vdot_p != NULL && f->n_p > 0) {
+        memcpy(out->vdot_p, c->moment_p, doubles(n_q * f->n_p));
+        mhi_cholesky_solve(c->mass, n_q, out->vdot_p, f->n_p);
+    }
     if (out->vdot_r != NULL && f->n_r > 0) {
         memset(out->vdot_r, 0, doubles(n_q * f->n_r));
         for (int32_t i = 0; i < n_q; i++) {
@@ -245,9 +256,9 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
     const int32_t n_q = face->n_q, rates = face->n_z > 0 && out->zdot != NULL;
     const int32_t derivatives =
         out->vdot_q != NULL || out->vdot_v != NULL || out->vdot_a != NULL || out->vdot_r != NULL ||
-        out->vdot_z != NULL ||
+        out->vdot_z != NULL || out->vdot_p != NULL ||
         (rates && (out->zdot_q != NULL || out->zdot_v != NULL || out->zdot_a != NULL ||
-                   out->zdot_c != NULL || out->zdot_z != NULL));
+                   out->zdot_c != NULL || out->zdot_z != NULL || out->zdot_p != NULL));
     mhe_status status = kinematics(c, at->q, at->v, 1, derivatives, err);
     if (status == MHE_OK) {
         status = muscles(c, at, derivatives, rates, err);
@@ -271,6 +282,9 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
     mhi_cholesky_solve(c->mass, n_q, out->vdot, 1);
     if (rates) {
         state_rates(c, out);
+    }
+    if (rates && out->zdot_p != NULL && face->n_p > 0) {
+        mhi_parameters_rates(c, out->zdot_p);
     }
     return derivatives ? acceleration_derivatives(c, out, err) : MHE_OK;
 }
@@ -306,6 +320,8 @@ mhe_status mhi_system_muscles(mhi_system_context *c, const mhe_system_point *at,
                               .force_v = c->force_v,
                               .force_a = c->force_s + s->activation * s->face.n_m,
                               .force_z = c->force_z,
+                              .force_p = c->force_p,
+                              .moment_p = c->moment_p,
                               .moment = c->moment,
                               .moment_q = c->moment_q,
                               .moment_v = c->moment_v};

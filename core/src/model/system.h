@@ -43,6 +43,10 @@ typedef struct mhi_system_setup {
     const mhi_force_setup *forces;
     int32_t n_forces;
     const mhi_bounds *bounds; /* NULL: none */
+    /* Parameters by which derivatives are given: numbers of a muscle ("max_isometric_force"), each
+     * a block of the layout with an entry a muscle. MHE_E_CONFIG: the muscle plugin has none. */
+    const char *const *parameters;
+    int32_t n_parameters;
 } mhi_system_setup;
 
 typedef struct mhi_system mhi_system;
@@ -62,6 +66,22 @@ void mhi_system_point(const mhi_system *system, const double *x, const double *u
 /* Activations [n_m] of x and u; activation-driven and u NULL: NULL. */
 const double *mhi_system_activation(const mhi_system *system, const double *x, const double *u);
 
+/* Inputs of the forces that have them in a file, at time t (s); the others' entries of w [n_w] are
+ * left alone. [hot] */
+mhe_status mhi_system_inputs(const mhi_system *system, double t, double *w, mhe_error *err);
+/* Whether the input block `name` comes with the frames, not from a file. */
+int32_t mhi_system_input_is_measured(const mhi_system *system, const char *name);
+/* MHE_E_INPUT: the inputs of a force are not known from `first` to `last` (s): its file is shorter,
+ * or they have none and `measured` is 0. The message begins with "forces.<position>: ". [cold] */
+mhe_status mhi_system_covers(const mhi_system *system, double first, double last, int32_t measured,
+                             mhe_error *err);
+
+/* Values of the parameters p [n_p], in their units; at first those of the description. Setting them
+ * makes the muscles anew: not while anything is evaluated. MHE_E_INPUT: the muscle plugin refuses
+ * one; the old ones hold on. [cold] */
+void mhi_system_parameters(const mhi_system *system, double *p);
+mhe_status mhi_system_set_parameters(mhi_system *system, const double *p, mhe_error *err);
+
 /* Memory for one thread; it is the `context` that mhe_system.acceleration takes. [cold] */
 typedef struct mhi_system_context mhi_system_context;
 mhe_status mhi_system_context_create(const mhi_system *system, mhi_system_context **context,
@@ -77,6 +97,8 @@ typedef struct mhi_muscle_state {
     const double *force_q, *force_v; /* [n_m x n_q] each */
     const double *force_a;           /* [n_m], where n_a > 0 */
     const double *force_z;           /* [n_z] of its own muscle */
+    const double *force_p;           /* [n_p] of the parameter's own muscle */
+    const double *moment_p;          /* [n_q x n_p] */
     const double *moment;            /* -L_q^T F [n_q] */
     const double *moment_q;          /* [n_q x n_q] */
     const double *moment_v;          /* [n_q x n_q] */

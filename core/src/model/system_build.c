@@ -107,12 +107,22 @@ static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe
     if (status == MHE_OK) {
         status = find_ranges(s, err);
     }
+    s->muscle_plugin = setup->muscle;
+    s->muscle_config = setup->muscle_config;
+    s->muscles = MHI_TAKE(&s->arena, mhe_muscle, d->n_muscles);
+    if (status == MHE_OK && s->muscles == NULL) {
+        status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
     if (status == MHE_OK) {
-        status = mhi_muscle_create(setup->muscle, setup->host, d->muscles, d->n_muscles,
+        memcpy(s->muscles, d->muscles, sizeof *s->muscles * (size_t)d->n_muscles);
+        status = mhi_muscle_create(setup->muscle, setup->host, s->muscles, d->n_muscles,
                                    setup->muscle_config, &s->muscle_self, &s->muscle_layout, err);
     }
     if (status == MHE_OK) {
         status = check_muscle_layout(s, setup->muscle->id, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_parameters_find(s, setup, err);
     }
     if (status == MHE_OK) {
         status = mhi_forces_create(s, setup, err);
@@ -146,6 +156,9 @@ mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system,
                            .acceleration = mhi_system_acceleration,
                            .activation_rate = mhi_system_activation_rate};
     status = create_parts(s, setup, err);
+    if (status == MHE_OK) {
+        status = mhi_forces_check(s, err);
+    }
     if (status != MHE_OK) {
         mhi_system_free(s);
         return status;
@@ -184,6 +197,7 @@ const mhe_system *mhi_system_face(const mhi_system *s) {
 static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
     const mhi_system *s = c->system;
     const int32_t n_q = s->face.n_q, n_m = s->face.n_m, n_p = s->n_paths, n_z = s->face.n_z;
+    const int32_t n_p_all = s->n_parameters > 0 ? s->muscle_layout.n_parameters : 0;
     const int32_t n_s = n_m * s->n_s, other = s->n_forces > 0 ? n_q : 0, n_t = s->most_paths;
     struct {
         double **array;
@@ -227,7 +241,11 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                   {&c->t_velocity, n_t},
                   {&c->load, 9 * s->most_loads},
                   {&c->row_q, n_q},
-                  {&c->row_v, n_q}};
+                  {&c->row_v, n_q},
+                  {&c->all_force_p, n_p_all * n_m},
+                  {&c->all_rate_p, n_p_all * n_s},
+                  {&c->force_p, s->face.n_p},
+                  {&c->moment_p, n_q * s->face.n_p}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         *wanted[i].array = MHI_TAKE(&c->arena, double, wanted[i].n);
         if (*wanted[i].array == NULL) {

@@ -14,11 +14,13 @@ typedef struct mhi_force {
     void *self;
     mhe_force_layout layout;
     const char *name;
+    int32_t position;    /* in the setup */
     int32_t first_input; /* in w */
 } mhi_force;
 
 struct mhi_system {
     mhe_system face;
+    mhe_host host; /* for force plugins: the setup's with services of our own */
     mhe_layout layout;
     const mhe_description *description;
     int32_t formulation;
@@ -26,12 +28,18 @@ struct mhi_system {
     const mhe_muscle_ops *muscle;
     void *model_self, *muscle_self;
     mhe_muscle_layout muscle_layout;
+    const mhe_plugin *muscle_plugin;
+    const void *muscle_config;
+    mhe_muscle *muscles;     /* [n_m] the description's with the parameters' values */
+    int32_t n_parameters;    /* blocks of n_m entries */
+    int32_t *parameter;      /* [n_parameters] which of the muscle plugin's */
+    size_t *parameter_at;    /* [n_parameters] place of the number in mhe_muscle */
     int32_t n_s, activation; /* states of a muscle, which of them is the activation */
     int32_t n_paths;
     int32_t *first, *end; /* [n_paths] coordinates that a path sees lie in [first, end) */
     int32_t *z_state;     /* [n_z] which of its muscle's states an entry of z is */
     mhi_force *forces;
-    int32_t n_forces, n_forces_created;
+    int32_t n_forces;                            /* that do something */
     int32_t most_inputs, most_paths, most_loads; /* of one force */
     mhi_arena arena;
 };
@@ -55,11 +63,20 @@ struct mhi_system_context {
     double *tension, *tension_l, *tension_w, *t_length, *t_velocity; /* [most_paths] */
     double *load;                                                    /* [most_loads x 9] */
     double *row_q, *row_v;                                           /* [n_q] */
+    double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
+    double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */
     mhi_arena arena;
 };
 
 /* layout.c: fills s->layout and the sizes of s->face from the plugins' layouts. */
 mhe_status mhi_layout_make(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+
+/* parameters.c: finds the parameters that the setup names; their derivatives of muscle forces and
+ * rates, out of the plugin's, into the context's; z rates' into zdot_p [n_z x n_p]. */
+mhe_status mhi_parameters_find(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+const char *mhi_parameter_unit(const mhi_system *s, int32_t i);
+void mhi_parameters_forces(mhi_system_context *c);
+void mhi_parameters_rates(const mhi_system_context *c, double *zdot_p);
 
 /* system.c: the functions of the face. */
 mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
@@ -78,6 +95,8 @@ void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, doub
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
  * in other_q, other_v. Needs the kinematics of `at` in the context. */
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+/* Each is finite at the model's default posture; once the system is whole. */
+mhe_status mhi_forces_check(mhi_system *s, mhe_error *err);
 void mhi_forces_destroy(mhi_system *s);
 mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at,
                                int32_t derivatives, mhe_error *err);

@@ -86,13 +86,14 @@ static void widen(const mhi_ocp *ocp, const mhi_ocp_worker *w, double *A, double
     memcpy(B, w->B, sizeof(double) * (size_t)(ocp->n_x * n_u));
 }
 
-mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, double *memory, const double *x,
-                        const double *u, const mhe_stage_values *out, mhe_error *err) {
+mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double *memory,
+                        const double *x, const double *u, const mhe_stage_values *out,
+                        mhe_error *err) {
     const int carries = ocp->signals.n_carried > 0;
     const mhe_step_derivatives d = {sizeof d, carries && out->A != NULL ? w->A : out->A,
                                     carries && out->B != NULL ? w->B : out->B, out->P};
-    mhe_status status = ocp->integrator->step(w->integrator, x, u, NULL, ocp->interval, memory,
-                                              out->x_next, &d, err);
+    mhe_status status = ocp->integrator->step(w->integrator, x, u, mhi_ocp_inputs_at(ocp, k),
+                                              ocp->interval, memory, out->x_next, &d, err);
     if (status == MHE_OK && carries) {
         if (out->A != NULL) {
             widen(ocp, w, out->A, out->B);

@@ -143,6 +143,14 @@ static double *interval_memory(const mhi_ocp *ocp, int32_t k) {
     return ocp->memory_size == 0 ? NULL : ocp->memory + (ptrdiff_t)place * ocp->memory_size;
 }
 
+double *mhi_ocp_inputs_at(const mhi_ocp *ocp, int32_t k) {
+    return ocp->n_w == 0 ? NULL : ocp->inputs + (ptrdiff_t)k * ocp->n_w;
+}
+
+double *mhi_ocp_input(mhi_ocp *ocp, int32_t k) {
+    return mhi_ocp_inputs_at(ocp, k);
+}
+
 mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_index, int32_t k,
                             const double *x, const double *u, const mhe_stage_values *out,
                             mhe_error *err) {
@@ -160,7 +168,7 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
         status = evaluate_cost(ocp, w, k, x, u, out, err);
     }
     if (status == MHE_OK && u != NULL && out->x_next != NULL) {
-        status = mhi_ocp_step(ocp, w, interval_memory(ocp, k), x, u, out, err);
+        status = mhi_ocp_step(ocp, w, k, interval_memory(ocp, k), x, u, out, err);
     }
     return status;
 }
@@ -206,6 +214,10 @@ int32_t mhi_ocp_reads(const mhi_ocp *ocp, int32_t signal) {
     return (ocp->wanted >> signal & 1) != 0;
 }
 
+const mhi_system *mhi_ocp_system(const mhi_ocp *ocp) {
+    return ocp->system;
+}
+
 double *mhi_ocp_x_lower(mhi_ocp *ocp, int32_t k) {
     return ocp->x_lower + (ptrdiff_t)k * ocp->face.n_x;
 }
@@ -235,6 +247,10 @@ void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {
 void mhi_ocp_shift(mhi_ocp *ocp) {
     const int32_t last = ocp->face.n_intervals - 1;
     ocp->first_memory = (ocp->first_memory + 1) % ocp->face.n_intervals;
+    if (ocp->n_w > 0) {
+        memmove(ocp->inputs, ocp->inputs + ocp->n_w,
+                sizeof(double) * (size_t)(ocp->face.n_intervals * ocp->n_w));
+    }
     if (last > 0 && ocp->memory_size > 0) {
         memcpy(interval_memory(ocp, last), interval_memory(ocp, last - 1),
                sizeof(double) * (size_t)ocp->memory_size);
@@ -257,15 +273,21 @@ void mhi_ocp_set_stop(mhi_ocp *ocp, const atomic_int *stop) {
     ocp->stop = stop;
 }
 
+/* From files: of the middle of the interval that begins at node k. The last node's are those with
+ * which a prediction goes on. */
 void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time) {
     ocp->times[k] = time;
+    if (ocp->n_w > 0) {
+        (void)mhi_system_inputs(ocp->system, time + 0.5 * ocp->interval, mhi_ocp_inputs_at(ocp, k),
+                                NULL);
+    }
 }
 
-mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
-                           mhe_error *err) {
+mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                           double *x_next, mhe_error *err) {
     const mhe_stage_values out = {.size = sizeof out, .x_next = x_next};
     ocp->workers[0].linearised = 0;
-    return mhi_ocp_step(ocp, &ocp->workers[0], NULL, x, u, &out, err);
+    return mhi_ocp_step(ocp, &ocp->workers[0], k, NULL, x, u, &out, err);
 }
 
 int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {
@@ -275,8 +297,8 @@ int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {
 mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                              double *x_next, double *A, double *B, mhe_error *err) {
     const mhe_step_derivatives d = {sizeof d, A, B, NULL};
-    return ocp->integrator->step(ocp->workers[0].integrator, x, u, NULL, ocp->interval,
-                                 interval_memory(ocp, k), x_next, &d, err);
+    return ocp->integrator->step(ocp->workers[0].integrator, x, u, mhi_ocp_inputs_at(ocp, k),
+                                 ocp->interval, interval_memory(ocp, k), x_next, &d, err);
 }
 
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp) {

@@ -36,6 +36,7 @@ void mhi_ocp_free(mhi_ocp *ocp);
 const mhe_stage_problem *mhi_ocp_face(const mhi_ocp *ocp); /* what a solver sees */
 const mhe_problem *mhi_ocp_problem(const mhi_ocp *ocp);    /* what a cost sees */
 const mhi_signals *mhi_ocp_signals(const mhi_ocp *ocp);
+const mhi_system *mhi_ocp_system(const mhi_ocp *ocp);
 
 /* The signal that the muscles' controls are: MHI_SIGNAL_EXCITATION or MHI_SIGNAL_ACTIVATION. */
 int32_t mhi_ocp_control(const mhi_ocp *ocp);
@@ -58,6 +59,9 @@ double *mhi_ocp_u_upper(mhi_ocp *ocp, int32_t k);
 /* Target of a signal (MHI_SIGNAL_*) at node k: [n_y of the signal], NaN where none is known (as at
  * the start); NULL where the problem has no such signal. */
 double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
+/* Inputs of the system at node k [n_w], for what comes with the frames; those from files follow the
+ * time. NaN at the start. */
+double *mhi_ocp_input(mhi_ocp *ocp, int32_t k);
 /* The window moves on by one interval: what the integrator keeps of interval k + 1 becomes that of
  * k, the last one's that of the new one too. */
 void mhi_ocp_shift(mhi_ocp *ocp);
@@ -73,9 +77,9 @@ void mhi_ocp_set_stop(mhi_ocp *ocp, const atomic_int *stop);
  * the start): none. */
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight);
 
-/* x_next = F(x, u) by worker 0. */
-mhe_status mhi_ocp_predict(mhi_ocp *ocp, const double *x, const double *u, double *x_next,
-                           mhe_error *err);
+/* x_next = F(x, u) over interval k by worker 0. */
+mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                           double *x_next, mhe_error *err);
 /* The same of interval k with A [n_x x n_x] and B [n_x x n_u], of the system alone. */
 mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                              double *x_next, double *A, double *B, mhe_error *err);

@@ -205,10 +205,11 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->u_upper = filled(&ocp->arena, n * ocp->face.n_u, INFINITY);
     ocp->targets = filled(&ocp->arena, (n + 1) * ocp->signals.n_y, NAN);
     ocp->times = filled(&ocp->arena, n + 1, 0);
+    ocp->inputs = filled(&ocp->arena, (n + 1) * ocp->n_w, NAN);
     ocp->prior_centre = filled(&ocp->arena, ocp->face.n_x, 0);
     ocp->prior_weight = filled(&ocp->arena, ocp->face.n_x, 0);
-    for (int32_t k = 0; k <= n && ocp->times != NULL; k++) {
-        ocp->times[k] = k * ocp->interval;
+    for (int32_t k = 0; k <= n && ocp->times != NULL && ocp->inputs != NULL; k++) {
+        mhi_ocp_set_time(ocp, k, k * ocp->interval);
     }
     ocp->face.x_lower = ocp->x_lower;
     ocp->face.x_upper = ocp->x_upper;
@@ -216,7 +217,7 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->face.u_upper = ocp->u_upper;
     ocp->workers = MHI_TAKE(&ocp->arena, mhi_ocp_worker, ocp->face.n_workers);
     if (!ocp->x_lower || !ocp->x_upper || !ocp->u_lower || !ocp->u_upper || !ocp->targets ||
-        !ocp->times || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers) {
+        !ocp->times || !ocp->inputs || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;
@@ -306,6 +307,7 @@ mhe_status mhi_ocp_create(const mhi_ocp_setup *setup, mhi_ocp **result, mhe_erro
                                     .evaluate = mhi_ocp_evaluate};
     ocp->system = setup->system;
     ocp->n_x = f->n_x;
+    ocp->n_w = f->n_w;
     ocp->integrator = setup->integrator->ops;
     ocp->n_terms = setup->n_terms;
     ocp->interval = setup->interval;

@@ -34,8 +34,10 @@ struct mhi_ocp {
     double interval;
     const atomic_int *stop; /* NULL: never */
     double *x_lower, *x_upper, *u_lower, *u_upper;
-    double *targets;                     /* [(N+1) x n_y] */
-    double *times;                       /* [N+1] */
+    double *targets; /* [(N+1) x n_y] */
+    double *times;   /* [N+1] */
+    double *inputs;  /* [(N+1) x n_w] */
+    int32_t n_w;
     double *prior_centre, *prior_weight; /* [n_x] */
     const char *const *entry_names[MHI_N_SIGNALS];
     double *memory;                    /* [N x memory_size] a ring, see interval_memory() */
@@ -57,7 +59,10 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker, in
 void mhi_ocp_spread_carried(const mhi_ocp *ocp, const mhi_ocp_worker *w,
                             const mhe_stage_values *out);
 void mhi_ocp_read_carried(const mhi_ocp *ocp, int32_t k, const double *x, double *y);
-mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, double *memory, const double *x,
-                        const double *u, const mhe_stage_values *out, mhe_error *err);
+mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double *memory,
+                        const double *x, const double *u, const mhe_stage_values *out,
+                        mhe_error *err);
+/* Inputs of interval k [n_w]; NULL: there are none. */
+double *mhi_ocp_inputs_at(const mhi_ocp *ocp, int32_t k);
 
 #endif
