@@ -24,10 +24,12 @@ expect() {
     grep -qF -- "$1" "$2" || { cat "$2"; give_up "'$1' is not in $2"; }
 }
 
-# build_project NAME: into work/NAME against the installation; its programs are instrumented as the core is
+# build_project FOLDER: into work/<its name> against the installation; its programs are instrumented as the core is
 build_project() {
+    folder=$1
+    set -- "$(basename "$1")"
     {
-        "$cmake" -S "$here/$1" -B "$work/$1" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$prefix" \
+        "$cmake" -S "$folder" -B "$work/$1" -DCMAKE_C_COMPILER="$cc" -DCMAKE_PREFIX_PATH="$prefix" \
             -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_FLAGS="-Wall -Wextra -Wpedantic -Werror" \
             -DCMAKE_EXE_LINKER_FLAGS="${sanitizers:+-fsanitize=$sanitizers}"
         "$cmake" --build "$work/$1"
@@ -52,7 +54,7 @@ plugin_by_pkg_config() {
     # Unquoted: flags are words.
     # shellcheck disable=SC2046
     "$cc" -std=c11 -O2 -fPIC -shared -fvisibility=hidden -Wl,-z,defs $(pkg-config --cflags mhe-plugin) \
-        "$here/external_cost/cost_effort.c" -o "$work/by_pkg_config/cost_effort.so"
+        "$source/examples/cost_effort/cost_effort.c" -o "$work/by_pkg_config/cost_effort.so"
     symbols=$(nm -D --defined-only "$work/by_pkg_config/cost_effort.so" | awk '{print $3}')
     [ "$symbols" = mhe_plugin_entry ] || give_up "the plugin exports: $symbols"
     plugins=$(pkg-config --variable=plugindir mhe-plugin)
@@ -115,21 +117,43 @@ defaults() {
     cp "$work/defaults.yaml" "$file"
 }
 
+# The first half second of the demo by the example's muscles and integrator, streamed by the example's program: numbers
+# on every line, and not those of the usual muscles.
+stream_examples() {
+    demo=$source/models/arm19
+    set -- "$demo/demo.yaml" "data.markers=$work/markers.trc" "data.emg=$work/emg.sto" horizon.window=3
+    "$work/stream/stream" "$@" >"$work/usual.txt" || give_up "stream"
+    MHE_PLUGIN_PATH="$work/muscle_gauss:$work/integrator_midpoint" "$work/stream/stream" "$@" \
+        "muscle={plugin: org.example.muscle.gauss}" "integrator={plugin: org.example.integrator.midpoint, steps: 4}" \
+        >"$work/own.txt" || give_up "stream with plugins of its own"
+    for file in usual own; do
+        awk 'NF != 20 || /nan|inf/ {exit 1} {n++} END {exit n < 10}' "$work/$file.txt" || give_up "stream: $file.txt"
+    done
+    if cmp -s "$work/usual.txt" "$work/own.txt"; then
+        give_up "other muscles, the same forces"
+    fi
+}
+
 install_and_move
 defaults
-build_project external_cost
-(cd "$work/external_cost" && ctest --output-on-failure) >"$work/ctest.log" || { cat "$work/ctest.log"; give_up ctest; }
-build_project external_app
+# The examples as a stranger has them: from the installed package, each built and checked for itself.
+for example in cost_effort muscle_gauss force_spring integrator_midpoint; do
+    build_project "$prefix/share/mhe/examples/$example"
+    (cd "$work/$example" && ctest --output-on-failure) >"$work/ctest.log" || { cat "$work/ctest.log"; give_up "$example"; }
+done
+build_project "$prefix/share/mhe/examples/stream"
+build_project "$here/external_app"
 # It lies outside of bin/ and knows of no variable: the plugins are found as seen from libmhe.so.
 env -u MHE_PLUGIN_PATH "$work/external_app/embed" "$source/models/arm19/demo.yaml" >"$work/embed.txt" || give_up embed
 expect "4 coordinates, 19 muscles" "$work/embed.txt"
-export MHE_PLUGIN_PATH="$work/external_cost"
+export MHE_PLUGIN_PATH="$work/cost_effort"
 "$work/external_app/embed" "$source/models/arm19/demo.yaml" --set=solver.plugin=no.such.plugin >"$work/none.txt" 2>&1 &&
     give_up "a plugin that is not there was found"
 expect "no plugin 'no.such.plugin'" "$work/none.txt"
-expect "searched: $work/external_cost, $prefix/$libdir/mhe/plugins/abi0, " "$work/none.txt"
+expect "searched: $work/cost_effort, $prefix/$libdir/mhe/plugins/abi0, " "$work/none.txt"
 export PKG_CONFIG_PATH="$prefix/$libdir/pkgconfig"
 plugin_by_pkg_config
 application_by_pkg_config
 run_with_plugin
+stream_examples
 echo "installed package: all as it should be"
