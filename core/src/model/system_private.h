@@ -55,6 +55,8 @@ struct mhi_system_context {
     double *tension, *tension_l, *tension_w, *t_length, *t_velocity; /* [most_paths] */
     double *load;                                                    /* [most_loads x 9] */
     double *row_q, *row_v;                                           /* [n_q] */
+    mhi_work *work;                                                  /* NULL: no bound */
+    int64_t loan;                                                    /* of it */
     mhi_arena arena;
 };
 
