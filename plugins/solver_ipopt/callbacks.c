@@ -117,6 +117,8 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
         s->stopped = MHE_SOLVE_INTERRUPTED;
     } else if (control != NULL && control->deadline > 0 && is_late(s)) {
         s->stopped = MHE_SOLVE_DEADLINE;
+    } else if (control != NULL && control->spent != NULL && control->spent(control->budget, 1)) {
+        s->stopped = MHE_SOLVE_DEADLINE;
     }
     return s->stopped == 0 && s->nlp.failure == MHE_OK;
 }

@@ -72,22 +72,23 @@ typedef struct rti_solver {
     double *spread;                     /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
     double *gain, *rest, *joint;        /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
     rti_pool *pool;
-    rti_worker *workers;      /* [n_workers of the problem] */
-    double *stage_cost;       /* [N+1] of the last evaluation, not scaled */
-    mhe_status *stage_status; /* [N+1] */
-    double scale;             /* of the objective; 0 before the first solve */
-    double penalty;           /* of the gaps in the merit function; this solve's */
-    double damping;           /* Levenberg's, of the next step */
-    int32_t warm;             /* the multipliers are worth a start */
-    double gap_sum;           /* at `here` */
-    rti_residuals residuals;  /* at the last linearisation */
-    double least_excess;      /* of the points of this solve, see rti_excess() */
-    rti_leap leap;            /* of the last step, if a real-time iteration ended with it */
-    double deadline;          /* this solve's; infinity: none */
-    double iteration_time;    /* s, of this solve's last iteration */
-    double seconds;           /* spent in evaluate() */
-    mhe_status failure;       /* negative status of evaluate() */
-    mhe_error *err;           /* the caller's, for its text */
+    rti_worker *workers;              /* [n_workers of the problem] */
+    double *stage_cost;               /* [N+1] of the last evaluation, not scaled */
+    mhe_status *stage_status;         /* [N+1] */
+    double scale;                     /* of the objective; 0 before the first solve */
+    double penalty;                   /* of the gaps in the merit function; this solve's */
+    double damping;                   /* Levenberg's, of the next step */
+    int32_t warm;                     /* the multipliers are worth a start */
+    double gap_sum;                   /* at `here` */
+    rti_residuals residuals;          /* at the last linearisation */
+    double least_excess;              /* of the points of this solve, see rti_excess() */
+    rti_leap leap;                    /* of the last step, if a real-time iteration ended with it */
+    double deadline;                  /* this solve's; infinity: none */
+    const mhe_solve_control *control; /* this solve's, or NULL */
+    double iteration_time;            /* s, of this solve's last iteration */
+    double seconds;                   /* spent in evaluate() */
+    mhe_status failure;               /* negative status of evaluate() */
+    mhe_error *err;                   /* the caller's, for its text */
     void *memory;
 } rti_solver;
 
@@ -140,6 +141,10 @@ double rti_now(void); /* s of CLOCK_MONOTONIC */
 
 /* covariance.c */
 mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err);
+
+/* step.c: the work that this solve may do is done; `steps` interior-point steps since this was last
+ * asked. */
+int32_t rti_is_spent(const rti_solver *s, int32_t steps);
 
 /* sqp.c */
 mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err);

@@ -144,7 +144,8 @@ static int32_t verdict(const rti_solver *s, const mhe_solve_control *control, in
         return MHE_SOLVE_ITERATION_LIMIT;
     }
     /* The next iteration will take about as long as the last one. */
-    if (isfinite(s->deadline) && rti_now() + s->iteration_time >= s->deadline) {
+    if ((isfinite(s->deadline) && rti_now() + s->iteration_time >= s->deadline) ||
+        rti_is_spent(s, 0)) {
         return MHE_SOLVE_DEADLINE;
     }
     return -1;
@@ -301,6 +302,7 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
     s->failure = MHE_OK;
     s->seconds = s->iteration_time = 0;
     s->leap = (rti_leap){0};
+    s->control = control;
     s->deadline = control != NULL && control->deadline > 0 ? control->deadline : INFINITY;
     if (isfinite(s->deadline) && rti_now() >= s->deadline) { /* at once */
         info->outcome = MHE_SOLVE_DEADLINE;
@@ -314,5 +316,6 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
         }
     }
     info->evaluation_time = s->seconds;
+    s->control = NULL;
     return s->failure;
 }

@@ -14,9 +14,18 @@
 /* Part of the least residual so far that a step may leave, whatever its merit. */
 #define NEARER 0.5
 
+int32_t rti_is_spent(const rti_solver *s, int32_t steps) {
+    const mhe_solve_control *control = s->control;
+    return control != NULL && control->spent != NULL && control->spent(control->budget, steps);
+}
+
+static int32_t rti_is_late(const rti_solver *s, int32_t steps) {
+    return rti_is_spent(s, steps) || (isfinite(s->deadline) && rti_now() >= s->deadline);
+}
+
+/* Before each interior-point step. */
 static int32_t is_late(const void *data) {
-    const rti_solver *s = data;
-    return isfinite(s->deadline) && rti_now() >= s->deadline;
+    return rti_is_late(data, 1);
 }
 
 /* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
@@ -29,7 +38,7 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
                               .complementarity = 0.01 * s->config->tolerance,
                               .max_iterations = s->config->max_qp_iterations,
                               .regularisation = 1e-9,
-                              .is_late = isfinite(s->deadline) ? is_late : NULL,
+                              .is_late = s->control != NULL ? is_late : NULL,
                               .data = s};
     for (size_t i = 0; i < n; i++) {
         q->lower[i] = s->lower[i] - s->here.w[i];
@@ -224,6 +233,9 @@ int32_t rti_step_full(rti_solver *s) {
         if (s->failure != MHE_OK) {
             break;
         }
+        if (rti_is_late(s, 0)) {
+            return RTI_LATE;
+        }
     }
     return RTI_STUCK;
 }
@@ -321,7 +333,7 @@ static double search(rti_solver *s, double slope) {
         if (rti_evaluate(s, &s->trial, RTI_DYNAMICS | RTI_COSTS) && is_better(s, length, slope)) {
             return rti_evaluate(s, &s->trial, RTI_ALL) ? length : 0;
         }
-        if (s->failure != MHE_OK || is_late(s)) {
+        if (s->failure != MHE_OK || rti_is_late(s, 0)) {
             return 0;
         }
     }
@@ -345,10 +357,10 @@ static double try_step(rti_solver *s, int32_t result) {
     if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
         return 1;
     }
-    if (known && result == QP_SOLVED && !is_late(s) && second_look(s, slope)) {
+    if (known && result == QP_SOLVED && !rti_is_late(s, 0) && second_look(s, slope)) {
         return 1;
     }
-    return s->failure == MHE_OK && !is_late(s) ? search(s, slope) : 0;
+    return s->failure == MHE_OK && !rti_is_late(s, 0) ? search(s, slope) : 0;
 }
 
 int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
@@ -369,7 +381,7 @@ int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
         if (s->failure != MHE_OK) {
             break;
         }
-        if (is_late(s)) {
+        if (rti_is_late(s, 0)) {
             return RTI_LATE;
         }
         if (result == QP_INFEASIBLE) {

@@ -124,6 +124,12 @@ typedef struct mhe_solve_control {
     void *data;      /* for progress */
     /* Called after each iteration; non-zero stops with MHE_SOLVE_INTERRUPTED. May be NULL. */
     int32_t (*progress)(void *data, int32_t iteration, double objective, double kkt_residual);
+    void *budget; /* for spent */
+    /* Not 0: the work that this solve may do is done; the solver then stops as at a deadline. To be
+     * asked wherever the deadline is looked at, with the interior-point steps (factorisations of
+     * all stages) done since it was last asked; evaluate() counts for itself. Not while evaluate()
+     * runs. May be NULL. */
+    int32_t (*spent)(void *budget, int32_t steps);
 } mhe_solve_control;
 
 typedef struct mhe_solve_info {

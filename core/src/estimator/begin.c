@@ -185,7 +185,9 @@ static void bound_first_state(mhe_estimator *e) {
 mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     double nearest = 0;
     mhi_trust_begun(e);
+    mhi_pace_postures(e, 1);
     mhe_status status = guess_postures(e, e->begin.distance, &nearest, err);
+    mhi_pace_postures(e, 0);
     if (status != MHE_OK) {
         return status;
     }

@@ -217,6 +217,9 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
         status = create_parts(e, err);
     }
     if (status == MHE_OK) {
+        mhi_pace_create(e);
+    }
+    if (status == MHE_OK) {
         status = start_from_config(e, err);
     }
     if (status != MHE_OK) {

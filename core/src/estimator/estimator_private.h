@@ -16,6 +16,7 @@
 #include "estimator/create.h"
 #include "estimator/feed.h"
 #include "estimator/output.h"
+#include "estimator/pace.h"
 #include "estimator/trust.h"
 #include "estimator/window.h"
 
@@ -23,13 +24,6 @@
 #include <mhe/config.h>
 #include <mhe/estimator.h>
 #include <stddef.h>
-
-/* Time that a frame may take; s, of CLOCK_MONOTONIC where a point in time. */
-typedef struct mhi_pace {
-    double budget;  /* from a frame's arrival to its estimate; 0: no limit */
-    double arrival; /* of the frame in work */
-    double ahead;   /* spent by mhe_estimator_prepare on the next estimate */
-} mhi_pace;
 
 struct mhe_estimator {
     const mhe_host *host;

@@ -17,11 +17,12 @@ mhe_status mhe_estimator_prepare(mhe_estimator *e, mhe_error *err) {
         return status;
     }
     const double begin = mhi_now();
+    mhi_pace_prepare(e);
     mhi_window_follow(e);
     if (e->solver->prepare != NULL && mhi_phase_settled(e)) {
         status = e->solver->prepare(e->solver_self, &e->window.solution, err);
     }
-    e->pace.ahead += mhi_now() - begin;
+    mhi_pace_prepared(e, mhi_now() - begin);
     return status;
 }
 
@@ -155,7 +156,7 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
         estimate->kkt_residual = info.kkt_residual;
         estimate->evaluation_time = info.evaluation_time;
     }
-    e->pace.ahead = 0;
+    mhi_pace_end(e, estimate->status, info.iterations);
     mhi_window_advance(e); /* in any case: the next frame needs its place */
     *ready = status == MHE_OK;
     return status;
@@ -180,6 +181,7 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
         return status;
     }
     e->pace.arrival = mhi_now();
+    mhi_pace_begin(e);
     status = find_node(e, ours.time, &used, err);
     if (status != MHE_OK) {
         return status;

@@ -32,10 +32,21 @@ static void take_back_guess(mhe_estimator *e) {
     e->window.solution.has_multipliers = 0;
 }
 
-/* The model's own prediction from the first state under the guessed controls. */
+/* The model's own prediction from the first state under the guessed controls; where there is no
+ * time left for it, the guess, which is the last solution or prediction moved on. */
 static void predict(mhe_estimator *e) {
+    const int32_t late = e->pace.budget > 0 && mhi_pace_over(e);
     take_back_guess(e);
-    for (int32_t k = 0; k < e->window.n; k++) {
+    const mhi_window *w = &e->window;
+    mhe_solution *s = &e->window.solution;
+    memset(s->lambda, 0, sizeof(double) * (size_t)w->n * (size_t)w->n_x);
+    memset(s->zx_lower, 0, sizeof(double) * (size_t)(w->n + 1) * (size_t)w->n_x);
+    memset(s->zx_upper, 0, sizeof(double) * (size_t)(w->n + 1) * (size_t)w->n_x);
+    memset(s->zu_lower, 0, sizeof(double) * (size_t)w->n * (size_t)e->n_u);
+    memset(s->zu_upper, 0, sizeof(double) * (size_t)w->n * (size_t)e->n_u);
+    s->has_multipliers = 1; /* it is near, if it is a motion: the next window's start */
+    mhi_pace_predict(e);
+    for (int32_t k = 0; k < e->window.n && !late; k++) {
         double *next = mhi_row(e->window.solution.x, k + 1, e->window.n_x);
         mhe_status status =
             mhi_ocp_predict(e->ocp, k, mhi_row(e->window.solution.x, k, e->window.n_x),
@@ -48,15 +59,13 @@ static void predict(mhe_estimator *e) {
 }
 
 static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
-    const mhe_solve_control control = {.size = sizeof control,
-                                       .deadline = e->pace.arrival + e->pace.budget};
+    const mhe_solve_control control = {
+        .size = sizeof control,
+        .deadline = e->pace.budget > 0 ? e->pace.arrival + e->pace.budget : 0,
+        .budget = e,
+        .spent = mhi_pace_spent};
     *info = (mhe_solve_info){.size = sizeof *info};
-    return e->solver->solve(e->solver_self, e->pace.budget > 0 ? &control : NULL,
-                            &e->window.solution, info, err);
-}
-
-static int32_t out_of_time(const mhe_estimator *e) {
-    return e->pace.budget > 0 && mhi_now() >= e->pace.arrival + e->pace.budget;
+    return e->solver->solve(e->solver_self, &control, &e->window.solution, info, err);
 }
 
 /* What a number of a block counts as, for the prior: velocities and activations as they are, what
@@ -123,7 +132,7 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
             e->begin.rounds >= FIRST_SOLVES || status != MHE_OK) {
             mhi_phase_on(e, MHI_EVENT_SETTLED);
         }
-        cut = over || out_of_time(e);
+        cut = over || mhi_pace_over(e);
     }
     if (cut && !mhi_phase_settled(e) && info->outcome == MHE_SOLVE_CONVERGED) {
         info->outcome = MHE_SOLVE_DEADLINE; /* of what is not yet the last round */
@@ -155,7 +164,9 @@ static int32_t status_of(const mhe_estimator *e, int32_t outcome) {
     case MHE_SOLVE_ITERATION_LIMIT:
         return e->begin.restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_ITERATION_LIMIT;
     case MHE_SOLVE_DEADLINE:
-        return e->begin.restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_DEADLINE;
+        return e->begin.restarted   ? MHE_FRAME_RESTARTED
+               : e->pace.budget > 0 ? MHE_FRAME_DEADLINE
+                                    : MHE_FRAME_ITERATION_LIMIT;
     default:
         return MHE_FRAME_PREDICTED;
     }

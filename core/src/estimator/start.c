@@ -132,7 +132,7 @@ mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, do
             return status;
         }
         const double length = propose(s, q, damping);
-        if (length < 1e-9) {
+        if (length < 1e-9 || mhi_system_context_spent(s->context)) {
             break;
         }
         double trial_squares = 0;
@@ -164,7 +164,9 @@ mhe_status mhi_start_search(mhi_start *s, const double *measured, double *q, dou
     memcpy(s->best, q, bytes);
     mhe_status status = mhi_start_posture(s, measured, s->best, rms, err);
     double best = *rms;
-    for (int32_t p = 0; p < N_POSTURES && status == MHE_OK && best > 0.01; p++) {
+    for (int32_t p = 0;
+         p < N_POSTURES && status == MHE_OK && best > 0.01 && !mhi_system_context_spent(s->context);
+         p++) {
         for (int32_t i = 0; i < s->n_q; i++) {
             const mhe_coordinate *c = &s->description->coordinates[i];
             const double lower = isfinite(c->lower) ? c->lower : c->value - 1.5;

@@ -171,6 +171,22 @@ static void state_rates(const mhi_system_context *c, const mhe_acceleration *out
     }
 }
 
+/* ---- bounded work ---- */
+
+void mhi_system_context_set_work(mhi_system_context *c, mhi_work *work) {
+    c->work = work;
+}
+
+void mhi_system_context_settle(mhi_system_context *c) {
+    if (c->work != NULL) {
+        mhi_work_return(c->work, &c->loan);
+    }
+}
+
+int32_t mhi_system_context_spent(const mhi_system_context *c) {
+    return c->work != NULL && mhi_work_spent(c->work);
+}
+
 /* ---- accelerations ---- */
 
 static mhe_status kinematics(mhi_system_context *c, const double *q, const double *v,
@@ -259,6 +275,11 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         out->vdot_z != NULL || out->vdot_p != NULL ||
         (rates && (out->zdot_q != NULL || out->zdot_v != NULL || out->zdot_a != NULL ||
                    out->zdot_c != NULL || out->zdot_z != NULL || out->zdot_p != NULL));
+    if (c->work != NULL &&
+        !mhi_work_take(c->work, derivatives ? MHI_WORK_DERIVATIVES : MHI_WORK_ACCELERATION,
+                       &c->loan)) {
+        return mhe_fail(err, MHE_RETRY, "the work of this frame is used up");
+    }
     mhe_status status = kinematics(c, at->q, at->v, 1, derivatives, err);
     if (status == MHE_OK) {
         status = muscles(c, at, derivatives, rates, err);
@@ -357,6 +378,9 @@ mhe_status mhi_system_equilibrium(mhi_system_context *c, const double *q, const 
 mhe_status mhi_system_markers(mhi_system_context *c, const double *q, double *marker,
                               double *marker_q, mhe_error *err) {
     const mhe_kinematics out = {.size = sizeof out, .marker = marker, .marker_q = marker_q};
+    if (c->work != NULL) { /* bounded by itself: never refused */
+        (void)mhi_work_take(c->work, marker_q != NULL ? 2 : 1, &c->loan);
+    }
     return c->system->model->kinematics(c->model, q, c->zero, &out, err);
 }
 

@@ -9,6 +9,8 @@
 #ifndef MHI_SYSTEM_H
 #define MHI_SYSTEM_H
 
+#include "model/work.h"
+
 #include <mhe/cost.h>
 #include <mhe/force.h>
 #include <mhe/integrator.h>
@@ -87,6 +89,12 @@ typedef struct mhi_system_context mhi_system_context;
 mhe_status mhi_system_context_create(const mhi_system *system, mhi_system_context **context,
                                      mhe_error *err);
 void mhi_system_context_free(mhi_system_context *context);
+
+/* What the context's accelerations and kinematics take from; NULL, as at first: nothing. Lent.
+ * After a series of calls mhi_system_context_settle gives the rest of the last loan back. */
+void mhi_system_context_set_work(mhi_system_context *context, mhi_work *work);
+void mhi_system_context_settle(mhi_system_context *context);
+int32_t mhi_system_context_spent(const mhi_system_context *context); /* 1: no more work [hot] */
 
 /* Results of mhi_system_muscles, valid until the context's next call. Derivatives are there only
  * where they were asked for. n_m muscles, n_q coordinates; row-major. */

@@ -170,6 +170,7 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
     if (status == MHE_OK && u != NULL && out->x_next != NULL) {
         status = mhi_ocp_step(ocp, w, k, interval_memory(ocp, k), x, u, out, err);
     }
+    mhi_system_context_settle(w->system);
     return status;
 }
 
@@ -287,7 +288,9 @@ mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const doubl
                            double *x_next, mhe_error *err) {
     const mhe_stage_values out = {.size = sizeof out, .x_next = x_next};
     ocp->workers[0].linearised = 0;
-    return mhi_ocp_step(ocp, &ocp->workers[0], k, NULL, x, u, &out, err);
+    const mhe_status status = mhi_ocp_step(ocp, &ocp->workers[0], k, NULL, x, u, &out, err);
+    mhi_system_context_settle(ocp->workers[0].system);
+    return status;
 }
 
 int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {
@@ -297,8 +300,15 @@ int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {
 mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                              double *x_next, double *A, double *B, mhe_error *err) {
     const mhe_step_derivatives d = {sizeof d, A, B, NULL};
-    return ocp->integrator->step(ocp->workers[0].integrator, x, u, mhi_ocp_inputs_at(ocp, k),
-                                 ocp->interval, interval_memory(ocp, k), x_next, &d, err);
+    const mhe_status status =
+        ocp->integrator->step(ocp->workers[0].integrator, x, u, mhi_ocp_inputs_at(ocp, k), ocp->interval,
+                              interval_memory(ocp, k), x_next, &d, err);
+    mhi_system_context_settle(ocp->workers[0].system);
+    return status;
+}
+
+mhi_work *mhi_ocp_work(mhi_ocp *ocp) {
+    return &ocp->work;
 }
 
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp) {

@@ -73,6 +73,9 @@ void mhi_ocp_set_time(mhi_ocp *ocp, int32_t k, double time); /* s, told to costs
  * Lent; NULL (as at the start): never. */
 void mhi_ocp_set_stop(mhi_ocp *ocp, const atomic_int *stop);
 
+/* The account that all evaluations and predictions take from; without bound at the start. */
+mhi_work *mhi_ocp_work(mhi_ocp *ocp);
+
 /* Adds 1/2 sum_i weight_i (x_i - centre_i)^2 to node 0; both [n_x], copied. All weights 0 (as at
  * the start): none. */
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight);

@@ -118,6 +118,9 @@ static mhe_status create_worker(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err)
     }
     mhe_status status = mhi_system_context_create(ocp->system, &w->system, err);
     if (status == MHE_OK) {
+        mhi_system_context_set_work(w->system, &ocp->work);
+    }
+    if (status == MHE_OK) {
         status =
             ocp->integrator->context_create(ocp->integrator_self, w->system, &w->integrator, err);
     }
@@ -250,6 +253,7 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
 }
 
 static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
+    mhi_work_begin(&ocp->work, 0, 0);
     const mhe_system *f = mhi_system_face(setup->system);
     mhi_signals_layout(setup->system, &ocp->signals);
     ocp->terms = MHI_TAKE(&ocp->arena, mhi_term, ocp->n_terms);

@@ -33,6 +33,7 @@ struct mhi_ocp {
     int32_t begins;   /* 1: what is carried into node 0 is not known */
     double interval;
     const atomic_int *stop; /* NULL: never */
+    mhi_work work;
     double *x_lower, *x_upper, *u_lower, *u_upper;
     double *targets; /* [(N+1) x n_y] */
     double *times;   /* [N+1] */

@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "estimator/estimator_private.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Times the usual work of a frame, preparation included. A frame that was not prepared linearises
+ * itself, which takes less time for its work than the steps that follow do. */
+#define SOLVE 11.0
+#define SOLVE_PREPARED 8.0
+/* Ahead of a frame there is time, but with a deadline the next one must not wait. */
+#define PREPARE 20.0
+#define PREPARE_BY_CLOCK 8.0
+#define PREDICT 0.6
+#define POSTURES 0.5 /* of what is left, to search postures */
+/* An interior-point step, of each interval, in units of work. */
+#define STEP 4
+/* The first window starts from far and has no frame before it: this much, of each interval. Frames
+ * that come before a usual one is known share it, and each may take SLICE of it in any case. */
+#define FIRST 300000.0
+#define SLICE 0.01
+#define KNOWN 5 /* frames that make a usual one */
+/* Usual is at most this many times the least that ever was: hard data must not raise their own
+ * limit. A solver that iterates takes more on harder, but good data; one that does not, hardly. */
+#define DRIFT 1.25
+#define DRIFT_ITERATING 12.0
+/* Of the time to a deadline: what lies between an evaluation that ends late and the estimate. */
+#define GRACE 1.03
+
+void mhi_pace_create(mhe_estimator *e) {
+    e->pace.first = FIRST * e->window.n;
+}
+
+static double first_share(const mhe_estimator *e) {
+    return fmax(e->pace.first, SLICE * FIRST * e->window.n);
+}
+
+static int32_t by_clock(const mhe_estimator *e) {
+    return e->pace.budget > 0;
+}
+
+static void begin_work(mhe_estimator *e, double most) {
+    mhi_work_begin(mhi_ocp_work(e->ocp), (int64_t)most, 0);
+}
+
+void mhi_pace_begin(mhe_estimator *e) {
+    mhi_pace *p = &e->pace;
+    const double times = p->prepared > 0 ? SOLVE_PREPARED : SOLVE;
+    p->settled = mhi_phase_settled(e);
+    if (by_clock(e)) {
+        mhi_work_begin(mhi_ocp_work(e->ocp), 0, p->arrival + GRACE * p->budget);
+    } else {
+        begin_work(e, p->usual > 0 ? times * p->usual : first_share(e));
+    }
+}
+
+void mhi_pace_predict(mhe_estimator *e) {
+    const mhi_pace *p = &e->pace;
+    if (!by_clock(e)) {
+        begin_work(e, p->usual > 0 ? PREDICT * p->usual : SLICE * first_share(e));
+    }
+}
+
+void mhi_pace_postures(mhe_estimator *e, int32_t begun) {
+    mhi_work *work = mhi_ocp_work(e->ocp);
+    int64_t moved = e->pace.kept;
+    if (begun) {
+        e->pace.kept = (int64_t)((1 - POSTURES) * (double)(work->most - mhi_work_done(work)));
+        moved = -e->pace.kept;
+    }
+    mhi_work_return(work, &moved);
+}
+
+int32_t mhi_pace_over(mhe_estimator *e) {
+    return by_clock(e) ? mhi_now() >= e->pace.arrival + e->pace.budget
+                       : mhi_work_spent(mhi_ocp_work(e->ocp));
+}
+
+int32_t mhi_pace_spent(void *estimator, int32_t steps) {
+    mhe_estimator *e = estimator;
+    mhi_work *work = mhi_ocp_work(e->ocp);
+    int64_t done = -(int64_t)steps * STEP * e->window.n;
+    mhi_work_return(work, &done);
+    return mhi_work_spent(work);
+}
+
+void mhi_pace_prepare(mhe_estimator *e) {
+    const double usual = e->pace.usual, times = by_clock(e) ? PREPARE_BY_CLOCK : PREPARE;
+    begin_work(e, usual > 0 ? times * usual : first_share(e));
+}
+
+void mhi_pace_prepared(mhe_estimator *e, double seconds) {
+    e->pace.ahead += seconds;
+    e->pace.prepared += (double)mhi_work_done(mhi_ocp_work(e->ocp));
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static void learn(mhi_pace *p, double work, int32_t iterations) {
+    double sorted[MHI_PACE_FRAMES];
+    p->iterates |= iterations > 1;
+    p->frames[p->n_frames++ % MHI_PACE_FRAMES] = work;
+    const int32_t n = p->n_frames < MHI_PACE_FRAMES ? p->n_frames : MHI_PACE_FRAMES;
+    memcpy(sorted, p->frames, sizeof sorted);
+    qsort(sorted, (size_t)n, sizeof *sorted, by_value);
+    if (n >= KNOWN) {
+        const double median = sorted[n / 2];
+        p->least = p->usual == 0 ? median : fmin(p->least, median);
+        p->usual = fmin(median, (p->iterates ? DRIFT_ITERATING : DRIFT) * p->least);
+    }
+}
+
+/* Nothing is told of a first window that took its time and settled. */
+static void tell_first(mhe_estimator *e) {
+    char line[256];
+    e->pace.first_told = 1;
+    (void)snprintf(
+        line, sizeof line,
+        "from %.6g s on the first window found no motion that fits within the work it may "
+        "take; estimates go on from what there is. Do the recording's units, axes and "
+        "labels fit the model?",
+        e->window.times[0]);
+    e->host->log(e->host, MHE_LOG_WARNING, line);
+}
+
+void mhi_pace_end(mhe_estimator *e, int32_t frame_status, int32_t iterations) {
+    mhi_pace *p = &e->pace;
+    const double work = (double)mhi_work_done(mhi_ocp_work(e->ocp)) + p->prepared;
+    const int32_t converged = frame_status == MHE_FRAME_OK && p->settled;
+    const int32_t ended =
+        converged || (frame_status == MHE_FRAME_ITERATION_LIMIT && p->settled && !mhi_pace_over(e));
+    if (p->usual == 0) {
+        p->first = fmax(p->first - work, 0);
+        if (p->first == 0 && !p->first_told && !mhi_phase_settled(e)) {
+            tell_first(e);
+        }
+    }
+    if (converged || (ended && p->n_converged == 0)) {
+        p->n_converged += converged;
+        learn(p, work, iterations);
+    }
+    p->ahead = p->prepared = 0;
+}

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* pace.h: what a frame may take. With realtime.deadline_ms the clock says it; without, a multiple
+ * of the work that frames usually take (counted as in model/work.h), so that data which do not fit
+ * cost no more than data which do, and the same input gives the same output on any machine. */
+#ifndef MHI_PACE_H
+#define MHI_PACE_H
+
+#include <mhe/estimator.h>
+
+#define MHI_PACE_FRAMES 15 /* whose median is usual */
+
+typedef struct mhi_pace {
+    double budget;                  /* s from a frame's arrival to its estimate; 0: no limit */
+    double arrival;                 /* of the frame in work, s of CLOCK_MONOTONIC */
+    double ahead;                   /* s spent by mhe_estimator_prepare on the next estimate */
+    int64_t kept;                   /* from the search of postures */
+    double prepared;                /* work of the same */
+    double frames[MHI_PACE_FRAMES]; /* work of the last that ended as they should, a ring */
+    int32_t n_frames, n_converged;  /* so far */
+    double usual;                   /* 0: not known yet */
+    int32_t iterates;               /* a frame took more than one iteration */
+    double least;                   /* that usual was */
+    double first;                   /* what is left for the frames until then */
+    int32_t first_told;
+    int32_t settled; /* the frame in work is no beginning */
+} mhi_pace;
+
+void mhi_pace_create(mhe_estimator *e);
+/* The frame in work begins; and its solve, with what is left; and the prediction that stands in for
+ * it. */
+void mhi_pace_begin(mhe_estimator *e);
+void mhi_pace_predict(mhe_estimator *e);
+/* The search of postures of a window that begins has begun (1) or ended (0): a part of the frame's
+ * work is kept for the solve. */
+void mhi_pace_postures(mhe_estimator *e, int32_t begun);
+/* 1: its time or work is over. The second: mhe_solve_control.spent. */
+int32_t mhi_pace_over(mhe_estimator *e);
+int32_t mhi_pace_spent(void *estimator, int32_t steps);
+/* Ahead of a frame. */
+void mhi_pace_prepare(mhe_estimator *e);
+void mhi_pace_prepared(mhe_estimator *e, double seconds);
+/* The frame ended with MHE_FRAME_* after so many iterations. */
+void mhi_pace_end(mhe_estimator *e, int32_t frame_status, int32_t iterations);
+
+#endif

@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* work.h: how much may be computed before somebody must come back.
+ *
+ * One account for all threads, in units of half an acceleration of the system. Contexts of the
+ * system draw from it in small loans and give back what they did not use; where it is empty, or the
+ * time is over, the system has no value any more (MHE_RETRY), so that no integrator goes on for
+ * ever. As long as it lasts nothing depends on it; with several threads it may be another interval
+ * that finds it empty. */
+#ifndef MHI_WORK_H
+#define MHI_WORK_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#define MHI_WORK_ACCELERATION 2
+#define MHI_WORK_DERIVATIVES 6 /* an acceleration with its derivatives */
+#define MHI_WORK_LOAN 32
+
+typedef struct mhi_work {
+    atomic_llong left;
+    int64_t most;
+    double deadline; /* s of CLOCK_MONOTONIC; 0: none */
+} mhi_work;
+
+/* `most` 0: no bound. [hot] */
+void mhi_work_begin(mhi_work *work, int64_t most, double deadline);
+/* Since then, without what is on loan. */
+int64_t mhi_work_done(const mhi_work *work);
+int32_t mhi_work_spent(const mhi_work *work); /* 1: nothing is left, or it is too late */
+/* Takes from the account, `*loan` first. 0: there is no more. */
+int32_t mhi_work_take(mhi_work *work, int64_t units, int64_t *loan);
+void mhi_work_return(mhi_work *work, int64_t *loan);
+
+#endif
