@@ -84,8 +84,8 @@ mhe_status rig_create(const variant *v, int32_t estimates, const mhe_host *loud,
     status = mhi_recording_read(v->run, mhi_system_description(system), loud, &r->recording, err);
     if (status == MHE_OK && r->recording->n_frames > 0) {
         const double *time = r->recording->time;
-        status = mhe_estimator_covers(r->estimator, time[0], time[r->recording->n_frames - 1], 0,
-                                      err);
+        status =
+            mhe_estimator_covers(r->estimator, time[0], time[r->recording->n_frames - 1], 0, err);
     }
     if (status != MHE_OK) {
         return status;

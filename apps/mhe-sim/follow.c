@@ -92,8 +92,8 @@ static mhe_status follow_path(follow *f, mhe_error *err) {
     int32_t n = 0;
     mhe_status status = simulation_steps(s, p, &n, err);
     if (status == MHE_OK) {
-        status = mhe_estimator_covers(f->estimator, p->time[0],
-                                      p->time[0] + (n + window) / s->rate, 0, err);
+        status = mhe_estimator_covers(f->estimator, p->time[0], p->time[0] + (n + window) / s->rate,
+                                      0, err);
     }
     posture_at(f, p->time[0], f->q);
     memset(s->x_next, 0, sizeof(double) * (size_t)s->n_q);

@@ -175,8 +175,8 @@ mhe_status simulation_step(simulation *s, double time, mhe_error *err) {
     if (status != MHE_OK) {
         return status;
     }
-    status = s->integrator->step(s->integrator_context, s->x, s->u, s->w, 1 / s->rate,
-                                            NULL, s->x_next, NULL, err);
+    status = s->integrator->step(s->integrator_context, s->x, s->u, s->w, 1 / s->rate, NULL,
+                                 s->x_next, NULL, err);
     if (status != MHE_OK) {
         const mhe_error why = *err;
         return mhe_fail(err, MHE_E_NUMERIC, "integration stopped at %g s: %.500s", time, why.text);

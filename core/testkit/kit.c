@@ -124,7 +124,7 @@ static const struct {
     {MHE_COST_IFACE, mhi_check_cost},     {MHE_MUSCLE_IFACE, mhi_check_muscle},
     {MHE_MODEL_IFACE, mhi_check_model},   {MHE_INTEGRATOR_IFACE, mhi_check_integrator},
     {MHE_SOLVER_IFACE, mhi_check_solver}, {MHE_SOURCE_IFACE, mhi_check_source},
-    {MHE_SINK_IFACE, mhi_check_sink}, {MHE_FORCE_IFACE, mhi_check_force},
+    {MHE_SINK_IFACE, mhi_check_sink},     {MHE_FORCE_IFACE, mhi_check_force},
 };
 
 /* The defaults; a plugin with a required option cannot be created without knowing what it means. */

@@ -18,7 +18,7 @@
 #define RT_LARGEST (64u << 20) /* bytes of a packet that is believed */
 
 #define RT_EVENT_CHANGED 11 /* camera settings changed */
-#define RT_EVENT_CLOSED 12 /* QTM is shutting down */
+#define RT_EVENT_CLOSED 12  /* QTM is shutting down */
 
 typedef struct rt_packet {
     uint32_t type;

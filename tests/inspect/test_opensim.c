@@ -15,9 +15,9 @@
 
 enum { LENGTH, SPEED, ARM, MASS, TORQUE, BODY, MARKER, Q, FORCE, FIBER, N_WORST };
 
-static const char *const what[N_WORST] = {
-    "length",           "speed",  "moment arm", "mass matrix",
-    "inverse dynamics", "bodies", "markers", "coordinates", "muscle forces", "fibres"};
+static const char *const what[N_WORST] = {"length",           "speed",  "moment arm", "mass matrix",
+                                          "inverse dynamics", "bodies", "markers",    "coordinates",
+                                          "muscle forces",    "fibres"};
 
 typedef struct comparison {
     const oracle *o;

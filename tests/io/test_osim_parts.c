@@ -33,7 +33,7 @@ static void assert_near(double value, double expected, double tolerance) {
 
 #define DOCUMENT(content)                                                          \
     "<OpenSimDocument Version=\"40000\"><Model name=\"m\">\n" content "</Model></" \
-                                                                      "OpenSimDocument>\n"
+    "OpenSimDocument>\n"
 #define SET(name, content) "<" name "><objects>\n" content "</objects></" name ">\n"
 #define BODY(name, extra) \
     "<Body name=\"" name "\"><mass>1</mass><inertia>1 1 1 0 0 0</inertia>" extra "</Body>\n"

@@ -42,8 +42,8 @@ void mhi_electrodes_push(mhi_electrodes *electrodes, double time, const double *
 /* Normalised EMG [n_muscles] at a time; NaN: no electrode, or nothing measured. Samples of the last
  * second are kept. [hot] */
 void mhi_electrodes_at(const mhi_electrodes *electrodes, double time, double *emg);
-/* Largest envelope of a channel so far, in the column's unit, NaN before the first; with `reset` the
- * search begins anew. 0: it is no column. [any] */
+/* Largest envelope of a channel so far, in the column's unit, NaN before the first; with `reset`
+ * the search begins anew. 0: it is no column. [any] */
 int32_t mhi_electrodes_peak(mhi_electrodes *electrodes, int32_t channel, int32_t reset,
                             double *peak);
 /* Delay of the filters, and the part of it beyond the electromechanical delay, s. [any] */

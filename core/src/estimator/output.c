@@ -64,8 +64,7 @@ static const double *estimated(const mhi_output *o, int32_t signal) {
 static void give_tracked(mhe_estimator *e, int32_t i, int32_t k, int32_t controls) {
     const mhi_channel *c = &e->channels.rows[i];
     const int32_t width = c->face.width;
-    const int32_t of_control =
-        c->signal >= 0 && mhi_ocp_signals(e->ocp)->signal[c->signal].reads_u;
+    const int32_t of_control = c->signal >= 0 && mhi_ocp_signals(e->ocp)->signal[c->signal].reads_u;
     const ptrdiff_t at = (ptrdiff_t)(of_control ? controls : k) * width;
     const size_t bytes = sizeof(double) * (size_t)width;
     mhi_output_row *r = &e->output.rows[i];
@@ -78,8 +77,8 @@ static void give_tracked(mhe_estimator *e, int32_t i, int32_t k, int32_t control
                        .why = r->why,
                        .estimated = r->estimated};
     memcpy(r->measured, c->measured + at, bytes);
-    memcpy(r->estimated,
-           c->signal < 0 ? c->measured + at : estimated(&e->output, c->signal), bytes);
+    memcpy(r->estimated, c->signal < 0 ? c->measured + at : estimated(&e->output, c->signal),
+           bytes);
     for (int32_t j = 0; j < width; j++) {
         const int32_t why = c->why[at + j];
         r->why[j] = why == MHE_TRACK_USED && !c->read ? MHE_TRACK_UNREAD : why;

@@ -13,8 +13,7 @@ mhe_status mhi_model_read(const char *path, mhe_description **description, mhe_e
 
 /* The same with the coordinates that the file locks free, each with its own place among the others:
  * for inverse dynamics that sees their accelerations. [cold] */
-mhe_status mhi_model_read_unlocked(const char *path, mhe_description **description,
-                                   mhe_error *err);
+mhe_status mhi_model_read_unlocked(const char *path, mhe_description **description, mhe_error *err);
 
 /* Makes a finished description's coordinates i with a finite at[i] [n_coordinates] constants at
  * that value, as locked ones of the file are; the rest keep their order. MHE_E_MEMORY. [cold] */

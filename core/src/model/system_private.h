@@ -65,8 +65,8 @@ struct mhi_system_context {
     double *row_q, *row_v;                                           /* [n_q] */
     double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
     double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */
-    mhi_work *work;                                                  /* NULL: no bound */
-    int64_t loan;                                                    /* of it */
+    mhi_work *work;                   /* NULL: no bound */
+    int64_t loan;                     /* of it */
     mhi_arena arena;
 };
 

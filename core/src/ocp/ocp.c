@@ -301,8 +301,8 @@ mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const dou
                              double *x_next, double *A, double *B, mhe_error *err) {
     const mhe_step_derivatives d = {sizeof d, A, B, NULL};
     const mhe_status status =
-        ocp->integrator->step(ocp->workers[0].integrator, x, u, mhi_ocp_inputs_at(ocp, k), ocp->interval,
-                              interval_memory(ocp, k), x_next, &d, err);
+        ocp->integrator->step(ocp->workers[0].integrator, x, u, mhi_ocp_inputs_at(ocp, k),
+                              ocp->interval, interval_memory(ocp, k), x_next, &d, err);
     mhi_system_context_settle(ocp->workers[0].system);
     return status;
 }
