@@ -120,6 +120,9 @@ static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe
     }
     if (status == MHE_OK) {
         status = check_muscle_layout(s, setup->muscle->id, err);
+        if (status != MHE_OK && err != NULL) {
+            err->part = MHE_PART_MUSCLE;
+        }
     }
     if (status == MHE_OK) {
         status = mhi_parameters_find(s, setup, err);
