@@ -1,25 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "measure.h"
 
+#include "base/clock.h"
+#include "base/values.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <time.h>
 
 double measure_seconds(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
+    return mhi_seconds();
 }
 
 void measure_sort(double *values, int32_t n) {
-    if (n > 1) {
-        qsort(values, (size_t)n, sizeof(double), by_value);
-    }
+    mhi_sort(values, n);
 }
 
 double measure_percentile(const double *sorted, int32_t n, double fraction) {

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "report.h"
 
+#include "base/pi.h"
+
 #include <cJSON.h>
 #include <math.h>
 #include <mhe/version.h>
@@ -58,7 +60,7 @@ static void add_runs(const bench *b, mhi_text *out) {
                      1e3 * run->first, 100.0 * r->n_converged / r->n_estimates);
         add_ratio(&run->ratio, several, out);
         if (r->has_rmse) {
-            mhi_text_add(out, " %8.4f %8.3f", 180 / acos(-1) * r->rmse.q, r->rmse.force);
+            mhi_text_add(out, " %8.4f %8.3f", 180 / MHI_PI * r->rmse.q, r->rmse.force);
         }
         mhi_text_add(out, "\n");
     }
@@ -164,7 +166,7 @@ static void json_run(cJSON *list, const bench_run *run) {
     json_ratio(o, &run->ratio);
     if (r->has_rmse) {
         cJSON *rmse = cJSON_AddObjectToObject(o, "rmse");
-        add_number(rmse, "q_deg", 180 / acos(-1) * r->rmse.q);
+        add_number(rmse, "q_deg", 180 / MHI_PI * r->rmse.q);
         add_number(rmse, "force_n", r->rmse.force);
         add_number(rmse, "marker_mm", 1e3 * r->rmse.marker);
     }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* follow.c: given postures; the muscle controls are found on the way. */
+#include "base/pi.h"
 #include "estimator/columns.h"
 #include "estimator/create.h"
 #include "motion.h"
@@ -62,7 +63,7 @@ static void posture_at(const follow *f, double time, double *q) {
     for (int32_t i = 0; i < f->simulation.n_q; i++) {
         const double from = p->values[(ptrdiff_t)row * p->n_columns + f->column[i]];
         const double to = p->values[(ptrdiff_t)next * p->n_columns + f->column[i]];
-        const double unit = p->in_degrees && c[i].rotational ? acos(-1) / 180 : 1;
+        const double unit = p->in_degrees && c[i].rotational ? MHI_PI / 180 : 1;
         q[i] = (from + (to - from) * way) * unit;
     }
 }

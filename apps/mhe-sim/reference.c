@@ -2,6 +2,7 @@
 #define _GNU_SOURCE /* secure_getenv */
 #include "reference.h"
 
+#include "base/clock.h"
 #include "reference_picture.h"
 #include "reference_track.h"
 
@@ -33,12 +34,6 @@ static volatile sig_atomic_t interrupted;
 static void on_interrupt(int signal_number) {
     (void)signal_number;
     interrupted = 1;
-}
-
-static double seconds(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 void reference_describe(mhi_text *out) {
@@ -143,13 +138,13 @@ static mhe_status solve_step(reference *r, int32_t number, mhe_error *err) {
                                   .read_back = &read_back,
                                   .linearise = has_output(step)};
     mhe_solve_info info = {.size = sizeof info};
-    const double begin = seconds();
+    const double begin = mhi_seconds();
     mhe_status status = mhi_step_solve(&setup, &r->arena, &r->done[number], &info, err);
     end_iterations();
     if (status != MHE_OK) {
         return status;
     }
-    const double spent = seconds() - begin;
+    const double spent = mhi_seconds() - begin;
     (void)printf("%s: %d intervals, %d iterations, ", step->name, (int)step->intervals,
                  (int)info.iterations);
     if (read_back) {

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "reference_picture.h"
 
+#include "base/pi.h"
 #include "figure.h"
 #include "io/table.h"
 
 #include <math.h>
 #include <string.h>
 
-#define DEGREES (180 / 3.14159265358979323846)
+#define DEGREES (180 / MHI_PI)
 #define MOTIONS_MAX 4 /* as many shades as a figure has */
 #define ANGLES_MAX 12
 #define MUSCLES_MAX 8

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "trial.h"
 
+#include "base/pi.h"
 #include "estimator/create.h"
 #include "measure.h"
 #include <mhe/outbox.h>
@@ -151,7 +152,7 @@ static void add_number(mhi_text *cells, double value) {
 }
 
 void trial_cells(trial_result *r, mhi_text *cells) {
-    const double degrees = 180 / acos(-1);
+    const double degrees = 180 / MHI_PI;
     mhi_text_add(cells, "%s,%d", r->failed ? "failed" : "ok", (int)r->tally.n_solves);
     enum { N_COUNTS = 3 };
     const double values[] = {tally_converged(&r->tally),

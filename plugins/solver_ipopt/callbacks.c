@@ -115,9 +115,9 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
     if (control != NULL && control->progress != NULL &&
         control->progress(control->data, iteration, objective, s->kkt_residual)) {
         s->stopped = MHE_SOLVE_INTERRUPTED;
-    } else if (control != NULL && control->deadline > 0 && is_late(s)) {
-        s->stopped = MHE_SOLVE_DEADLINE;
-    } else if (control != NULL && control->spent != NULL && control->spent(control->budget, 1)) {
+    } else if (control != NULL &&
+               ((control->deadline > 0 && is_late(s)) ||
+                (control->spent != NULL && control->spent(control->budget, 1)))) {
         s->stopped = MHE_SOLVE_DEADLINE;
     }
     return s->stopped == 0 && s->nlp.failure == MHE_OK;

@@ -132,13 +132,10 @@ static void tables_say_the_same(void **state) {
 
 static void motion_has_opensim_names(void **state) {
     (void)state;
-    static const char *const lines[] = {"version=1\n",
-                                        "nRows=1500\n",
-                                        "nColumns=6\n",
-                                        "inDegrees=no\n",
-                                        "endheader\n",
-                                        "time\telbow\tshoulder, left\tBRA.activation\t"
-                                        "BRD.activation\tTRI.activation\n"};
+    static const char labels[] = "time\telbow\tshoulder, left\tBRA.activation\t"
+                                 "BRD.activation\tTRI.activation\n";
+    static const char *const lines[] = {"version=1\n",    "nRows=1500\n", "nColumns=6\n",
+                                        "inDegrees=no\n", "endheader\n",  labels};
     char line[256];
     FILE *file = fopen(path_of("motion.sto"), "r");
     assert_non_null(file);

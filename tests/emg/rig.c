@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "rig.h"
 
+#include "base/pi.h"
 #include "config/options.h"
 
 #include <math.h>
@@ -53,7 +54,7 @@ void rig_close(emg_rig *rig) {
 }
 
 double rig_force(double time) {
-    return 0.4 - 0.3 * cos(2 * acos(-1) * time);
+    return 0.4 - 0.3 * cos(2 * MHI_PI * time);
 }
 
 mhi_table *rig_table(int32_t n_rows) {
@@ -70,7 +71,7 @@ mhi_table *rig_table(int32_t n_rows) {
         t->labels[i] = strdup(labels[i]);
     }
     for (int32_t k = 0; k < n_rows; k++) {
-        const double time = k / RIG_RATE, carrier = sin(2 * acos(-1) * 95 * time);
+        const double time = k / RIG_RATE, carrier = sin(2 * MHI_PI * 95 * time);
         t->time[k] = time;
         t->values[3 * k] = 1;
         t->values[3 * k + 1] = 0.001 * carrier * rig_force(time);

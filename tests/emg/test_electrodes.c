@@ -2,6 +2,7 @@
 /* Electrodes: mapping, times, a recording against the same samples one by one, and bad data. */
 #include "emg/electrodes.h"
 
+#include "base/pi.h"
 #include "near.h"
 #include "rig.h"
 
@@ -81,7 +82,7 @@ static void electrodes_become_muscles(void **state) {
     check_told(&rig, "far above their MVC, which may be too small: B (3");
     for (int k = 30; k < FRAMES; k++) {
         const double t = k / 100.0 - rig.report.filter_delay;
-        assert_near(emg[3 * k], 2 / acos(-1) * rig_force(t), 0.01);
+        assert_near(emg[3 * k], 2 / MHI_PI * rig_force(t), 0.01);
         assert_near(emg[3 * k + 2], 0.5 * emg[3 * k], 1e-15);
         assert_near(emg[3 * k + 1], 1, 0.0);
     }
@@ -292,7 +293,7 @@ static void zero_phase_follows_without_delay(void **state) {
     assert_int_equal(rig_read(&rig, table, FRAMES, emg), MHE_OK);
     assert_near(rig.report.filter_delay, 0, 0.0);
     for (int k = 20; k < FRAMES - 20; k++) {
-        assert_near(emg[3 * k], 2 / acos(-1) * rig_force(k / 100.0), 0.01);
+        assert_near(emg[3 * k], 2 / MHI_PI * rig_force(k / 100.0), 0.01);
     }
     mhi_table_free(table);
     rig_close(&rig);

@@ -2,6 +2,7 @@
 /* Envelopes: what the parts are is what comes out, sample by sample; gaps; delay. */
 #include "emg/envelope.h"
 
+#include "base/pi.h"
 #include "emg/filter.h"
 #include "near.h"
 #include "rig.h"
@@ -75,7 +76,7 @@ static void windows_are_means(void **state) {
  * the modulation's frequency. */
 static void delay_is_that_of_a_modulated_carrier(void **state) {
     (void)state;
-    const double pi = acos(-1), slow = 0.5;
+    const double pi = MHI_PI, slow = 0.5;
     for (int32_t kind = MHI_EMG_LOW_PASS; kind <= MHI_EMG_RMS; kind++) {
         mhi_emg_section o = rig_options();
         mhi_envelope *e = NULL;
@@ -152,7 +153,7 @@ static void zero_phase_has_no_delay_and_spares_gaps(void **state) {
         mhe_error err = {0};
         o.envelope = kind;
         for (int k = 0; k < N; k++) {
-            x[k] = rig_force(k / RIG_RATE) * sin(2 * acos(-1) * 95 * k / RIG_RATE);
+            x[k] = rig_force(k / RIG_RATE) * sin(2 * MHI_PI * 95 * k / RIG_RATE);
         }
         for (int k = 3000; k < 3200; k++) {
             x[k] = NAN;
@@ -160,7 +161,7 @@ static void zero_phase_has_no_delay_and_spares_gaps(void **state) {
         assert_int_equal(mhi_envelope_zero_phase(&o, RIG_RATE, x, N, &err), MHE_OK);
         assert_int_equal(count_missing(x, 0, N), 200);
         assert_int_equal(count_missing(x, 3000, 3200), 200);
-        const double full = kind == MHI_EMG_RMS ? sqrt(0.5) : 2 / acos(-1);
+        const double full = kind == MHI_EMG_RMS ? sqrt(0.5) : 2 / MHI_PI;
         for (int k = 400; k < 2600; k++) { /* 6 Hz twice and 0.1 s flatten 1 Hz by a few percent */
             assert_near(x[k] / full, rig_force(k / RIG_RATE), 0.04);
         }

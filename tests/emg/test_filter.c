@@ -11,6 +11,7 @@
  */
 #include "emg/filter.h"
 
+#include "base/pi.h"
 #include "near.h"
 
 #include <math.h>
@@ -180,7 +181,7 @@ static void gains_are_those_of_butterworth(void **state) {
     for (int i = 0; i < 3; i++) {
         double memory[2 * MHI_FILTER_SECTIONS_MAX] = {0}, most = 0;
         for (int k = 0; k < 40000; k++) {
-            const double phase = 2 * acos(-1) * frequencies[i] * k / 2000;
+            const double phase = 2 * MHI_PI * frequencies[i] * k / 2000;
             const double y = mhi_filter_step(&filter, memory, sin(phase));
             most = k > 20000 ? fmax(most, fabs(y)) : 0;
         }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Measured joint angles in the place of markers: the demo's motion, with a gap. */
 #define _DEFAULT_SOURCE /* mkstemps */
+#include "base/pi.h"
 #include "estimator/recording.h"
 #include "fixture.h"
 #include "io/table.h"
@@ -116,7 +117,7 @@ static void write_degrees(char *path) {
     for (int32_t k = 0; k < t->n_rows; k++) {
         (void)fprintf(file, "\n%.17g", t->time[k]);
         for (int32_t i = 0; i < N_Q; i++) {
-            (void)fprintf(file, "\t%.17g", t->values[k * t->n_columns + i] * 180 / acos(-1));
+            (void)fprintf(file, "\t%.17g", t->values[k * t->n_columns + i] * 180 / MHI_PI);
         }
     }
     assert_int_equal(fclose(file), 0);

@@ -5,6 +5,7 @@
  * Asked: within 2 %, of tracking and of least excitation with the paper's high marker weights.
  * Measured: within 0.1 %; with the low weights it follows more slowly (docs/performance.md). The
  * ramp in the place of the paper's jump of the passive force gives every window an optimum. */
+#include "base/pi.h"
 #include "estimator/errors.h"
 #include "fixture.h"
 #include "noise/noise.h"
@@ -48,7 +49,7 @@ static void track(const char *cost, const char *preset, mhi_rmse *rmse) {
     }
     mhi_errors_rmse(errors, 5, 0, rmse);
     print_message("%s, %s: q %.4f deg, forces %.3f N, markers %.3f mm\n", cost, preset,
-                  rmse->q * 180 / acos(-1), rmse->force, 1e3 * rmse->marker);
+                  rmse->q * 180 / MHI_PI, rmse->force, 1e3 * rmse->marker);
     mhi_errors_free(errors);
     mhi_recording_free(r);
     mhi_recording_free(reference);

@@ -3,6 +3,7 @@
  * its excitations. Bounds: paper (Bailly et al. 2021) and an independent SQP with the same
  * settings, which reaches 0.0025 deg, 1.5 N and 0.009 mm excitation-driven, 0.006 deg, 2.1 N and
  * 0.02 mm activation-driven. */
+#include "base/pi.h"
 #include "estimator/errors.h"
 #include "fixture.h"
 #include "support.h"
@@ -79,8 +80,7 @@ static void track(const char *cost, const char *formulation, int ratio, result *
         "%s, %s, ratio %d: %d/%d converged, %.1f iterations, %.1f ms; q %.5f deg, force %.3f N, "
         "markers %.5f mm, activation %.5f\n",
         cost, formulation, ratio, out->converged, out->solves, out->iterations, 1e3 * out->seconds,
-        out->rmse.q * 180 / acos(-1), out->rmse.force, 1e3 * out->rmse.marker,
-        out->rmse.activation);
+        out->rmse.q * 180 / MHI_PI, out->rmse.force, 1e3 * out->rmse.marker, out->rmse.activation);
     mhi_errors_free(errors);
     mhi_recording_free(r);
     free(markers);
@@ -93,7 +93,7 @@ static void high_marker_weight_excitation(void **state) {
     track("mhe.cost.emg-markers-high", "excitation", 3, &r);
     assert_true(r.solves > 250);
     assert_int_equal(r.converged, r.solves);
-    assert_true(r.rmse.q < 0.01 * acos(-1) / 180);
+    assert_true(r.rmse.q < 0.01 * MHI_PI / 180);
     assert_true(r.rmse.force < 2);
     assert_true(r.rmse.marker < 0.02e-3);
 }
@@ -103,7 +103,7 @@ static void high_marker_weight_activation(void **state) {
     result r;
     track("mhe.cost.emg-markers-high", "activation", 4, &r);
     assert_int_equal(r.converged, r.solves);
-    assert_true(r.rmse.q < 0.05 * acos(-1) / 180);
+    assert_true(r.rmse.q < 0.05 * MHI_PI / 180);
     assert_true(r.rmse.marker < 0.1e-3);
 }
 
@@ -116,7 +116,7 @@ static void other_costs_run(void **state) {
         result r;
         track(costs[i / 2], formulations[i % 2], 4, &r);
         assert_true(r.converged >= 0.95 * r.solves);
-        assert_true(r.rmse.q < 1.0 * acos(-1) / 180);
+        assert_true(r.rmse.q < 1.0 * MHI_PI / 180);
     }
 }
 

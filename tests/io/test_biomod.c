@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* .bioMod reader: what is read, what is repaired, and what each mistake is called. */
+#include "base/pi.h"
 #include "io/description_builder.h"
 #include "io/model_file.h"
 #include "support.h"
@@ -50,7 +51,7 @@ static void reads_a_small_arm(void **state) {
     assert_string_equal(d->coordinates[0].name, "Arm_RotY");
     assert_string_equal(d->coordinates[1].name, "Arm_RotX");
     assert_string_equal(d->coordinates[2].name, "Arm_RotY2");
-    assert_true(d->coordinates[2].upper == acos(-1));
+    assert_true(d->coordinates[2].upper == MHI_PI);
     /* Rz(90) Ry(0) Rx(-45): x goes to y, y goes to -x cos45 - z sin45 */
     const double *r = d->bodies[1].joint_r, half = sqrt(0.5);
     assert_true(fabs(r[3] - 1) < 1e-15 && fabs(r[1] + half) < 1e-15 && fabs(r[7] + half) < 1e-15);
@@ -83,7 +84,7 @@ static void comments_arithmetic_and_variables(void **state) {
     assert_int_equal(d->coordinates[1].rotational, 0);
     assert_true(fabs(d->coordinates[1].lower + 0.9) < 1e-15);
     assert_true(d->coordinates[1].upper == 0.5);
-    assert_true(d->coordinates[2].lower == -2 * acos(-1));
+    assert_true(d->coordinates[2].lower == -2 * MHI_PI);
     assert_true(d->bodies[0].mass == 0.6);
     assert_true(fabs(d->bodies[0].com[1] + 0.1) < 1e-15 && d->bodies[0].com[2] == 2e-5);
     assert_int_equal(d->bodies[0].n_motions, 3);

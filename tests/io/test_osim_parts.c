@@ -1,14 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* .osim reader: couplers, moving and conditional points, wraps, splines, joints on ellipsoids,
  * forces, and what locking makes of them; layouts of OpenSim 3 and 4. */
+#include "base/pi.h"
 #include "io/description_builder.h"
 #include "io/model_file.h"
 #include "support.h"
 
 #include <math.h>
 #include <string.h>
-
-#define PI 3.14159265358979323846
 
 static mhe_description *parse_with(mhe_status (*reader)(const char *, const char *, size_t,
                                                         mhe_description **, mhe_error *),
@@ -345,8 +344,8 @@ static void forces_in_their_units(void **state) {
                           "<body_2>b</body_2><orientation_body_2>0 0 0.5</orientation_body_2>"
                           "<rotational_stiffness>1 2 3</rotational_stiffness></BushingForce>\n"
                           "<HuntCrossleyForce name=\"contact\"/>\n")));
-    const double degree = PI / 180;
-    assert_near(d->limits[0].upper, PI / 2, 1e-15);
+    const double degree = MHI_PI / 180;
+    assert_near(d->limits[0].upper, MHI_PI / 2, 1e-15);
     assert_near(d->limits[0].lower_stiffness, 1 / degree, 1e-12);
     assert_near(d->limits[0].damping, 0.5 / degree, 1e-12);
     assert_near(d->limits[0].transition, 10 * degree, 1e-15);

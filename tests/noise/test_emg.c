@@ -2,6 +2,8 @@
 /* The paper's EMG noise: moments over 1 000 seeds against the formulas, and what a seed means. */
 #include "rig.h"
 
+#include "base/pi.h"
+
 #include <math.h>
 #include <pthread.h>
 #include <string.h>
@@ -16,8 +18,8 @@ static double signal_at(int k) {
     double sum = 0;
     for (int i = 1; i <= 20; i++) { /* every harmonic in both phases, some negative */
         sum += 0.05 / i *
-               ((i % 3 == 0 ? -1 : 1) * cos(2 * acos(-1) * i * k / N) +
-                0.4 * sin(2 * acos(-1) * i * k / N));
+               ((i % 3 == 0 ? -1 : 1) * cos(2 * MHI_PI * i * k / N) +
+                0.4 * sin(2 * MHI_PI * i * k / N));
     }
     return sum;
 }
@@ -26,7 +28,7 @@ static double signal_at(int k) {
 static void transform(const double *x, int i, double *re, double *im) {
     *re = *im = 0;
     for (int k = 0; k < N; k++) {
-        const double angle = 2 * acos(-1) * fmod((double)i * k, N) / N;
+        const double angle = 2 * MHI_PI * fmod((double)i * k, N) / N;
         *re += x[k] * cos(angle);
         *im -= x[k] * sin(angle);
     }
@@ -106,7 +108,7 @@ static void means_over_many_seeds(void **state) {
     for (int k = 0; k < SHORT; k++) {
         clean[k] = BASE;
         for (int h = 0; h < 6; h++) {
-            wave[h][k] = cos(2 * acos(-1) * harmonics[h] * k / SHORT);
+            wave[h][k] = cos(2 * MHI_PI * harmonics[h] * k / SHORT);
             clean[k] += (h % 2 == 0 ? 0.02 : -0.02) * wave[h][k];
         }
     }

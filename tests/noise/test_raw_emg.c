@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Raw EMG: what the pipeline of core/src/emg makes of it is proportional to the excitation. */
+#include "base/pi.h"
 #include "config/options.h"
 #include "emg/envelope.h"
 #include "emg/filter.h"
@@ -163,8 +164,8 @@ static void the_signal_is_noise_in_the_band(void **state) {
     }
     const double deviates = n * (HIGH - LOW) / (RATE / 2); /* independent ones: about this many */
     const double mvc = 0.4 * MVC_A;
-    assert_within_5(rectified / n / mvc, 1, sqrt((acos(-1) / 2 - 1) / deviates), "rectified mean");
-    assert_within_5(square / n / (acos(-1) / 2 * mvc * mvc), 1, sqrt(2 / deviates), "variance");
+    assert_within_5(rectified / n / mvc, 1, sqrt((MHI_PI / 2 - 1) / deviates), "rectified mean");
+    assert_within_5(square / n / (MHI_PI / 2 * mvc * mvc), 1, sqrt(2 / deviates), "variance");
     assert_within_5(both / sqrt(square * other), 0, sqrt(1 / deviates), "common part");
     assert_true(slow < 0.02 * square); /* white noise: 1 */
     mhi_record_free(&emg);

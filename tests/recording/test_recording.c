@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A second of the real abduction: the model holds it, and faults of the data move the estimate by
  * no more than they should. Skipped where the reference data are absent. */
+#include "base/pi.h"
 #include "believe/exchange.h"
 #include "support.h"
 #include "track.h"
@@ -8,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#define DEGREES (180 / 3.14159265358979323846)
+#define DEGREES (180 / MHI_PI)
 
 static const char by_activations[] = "abduction.yaml", by_excitations[] = "excitation.yaml";
 static track whole, faulty; /* large */

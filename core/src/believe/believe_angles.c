@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "believe/believe.h"
 
+#include "base/pi.h"
+
 #include <math.h>
 #include <string.h>
 
-#define DEGREE (3.14159265358979323846 / 180)
+#define DEGREE (MHI_PI / 180)
 #define SLACK 0.1         /* rad or m: so far people move beyond a model's range */
 #define OFTEN 0.05        /* share of the frames */
 #define FULL_TURN 6.3     /* no joint moves further, in rad */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* believe_fit.c: one transform of all markers explains more than many misplaced ones. */
+#include "base/pi.h"
 #include "base/text.h"
 #include "believe/believe.h"
 #include "believe/pose.h"
@@ -67,7 +68,7 @@ static double axis_of(const mhi_pose *pose, double axis[3]) {
             axis[i] = i == largest ? a : r[3 * largest + i] / (2 * a);
         }
     }
-    return acos(c) * 180 / acos(-1);
+    return acos(c) * 180 / MHI_PI;
 }
 
 /* "rotate: x-90, shift: [...]", as the config takes it; scale -1 mirrors. */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* judge.c: is an estimate usable? From how it fits what was measured, never from a known truth. */
 #include "base/text.h"
+#include "base/values.h"
 #include "believe/diagnosis_private.h"
 
 #include <stdlib.h>
@@ -53,11 +54,6 @@ static void judge_solves(const mhi_diagnosis *d, mhi_findings *findings) {
     }
 }
 
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
     const mhe_estimator_info *f = d->info;
     double *each = malloc(sizeof *each * ((size_t)f->n_markers + 1)), squares = 0;
@@ -73,7 +69,7 @@ static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
         free(each);
         return;
     }
-    qsort(each, (size_t)n_seen, sizeof *each, by_value);
+    mhi_sort(each, n_seen);
     const double all = sqrt(squares / n), median = each[(n_seen - 1) / 2];
     if (all > MARKERS_FAR) {
         mhi_findings_add(findings, all > MARKERS_LOST ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL,

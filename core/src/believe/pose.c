@@ -5,6 +5,7 @@
 #include "believe/pose.h"
 
 #include "base/arena.h"
+#include "base/pi.h"
 #include "estimator/start.h"
 
 #include <math.h>
@@ -330,7 +331,7 @@ double mhi_pose_tilt(mhi_pose_search *s, const mhi_pose *pose) {
         for (int32_t i = 0; i < 9; i++) {
             along += g[i / 3] * body.turn[i] * g[i % 3] / (size * size);
         }
-        const double tilt = acos(fmin(fmax(along, -1), 1)) * 180 / acos(-1);
+        const double tilt = acos(fmin(fmax(along, -1), 1)) * 180 / MHI_PI;
         worst = fmax(worst, tilt);
     }
     return worst;

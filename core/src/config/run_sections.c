@@ -2,6 +2,8 @@
 /* run_sections.c: every key that the core itself understands, with default and range. */
 #include "config/run_sections.h"
 
+#include "base/pi.h"
+
 #include <float.h>
 #include <math.h>
 #include <mhe/force.h>
@@ -12,8 +14,6 @@
 #include <mhe/solver.h>
 #include <mhe/source.h>
 #include <string.h>
-
-#define PI 3.14159265358979323846
 
 static const mhe_option top_options[] = {
     MHE_OPT_ENUM(mhi_top_section, formulation, "excitation", "excitation|activation",
@@ -150,7 +150,7 @@ static const mhe_option bounds_options[] = {
     MHE_OPT_MAP(mhi_bounds_section, residual_torque_limits, 0,
                 "Largest magnitude at single coordinates, {NAME: N m}, in the place of "
                 "residual_torque_max."),
-    MHE_OPT_REAL(mhi_bounds_section, velocity_max, 10 * PI, 1e-6, INFINITY, "rad/s",
+    MHE_OPT_REAL(mhi_bounds_section, velocity_max, 10 * MHI_PI, 1e-6, INFINITY, "rad/s",
                  "Largest magnitude of a coordinate's velocity."),
     MHE_OPT_REAL(mhi_bounds_section, activation_min, 0, 0, 1, "1", "Least activation."),
     MHE_OPT_REAL(mhi_bounds_section, activation_max, 1, 0, 1, "1", "Largest activation."),

@@ -2,6 +2,8 @@
 /* run_transform.c: the turn that data.transform asks for. */
 #include "config/run_sections.h"
 
+#include "base/pi.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -79,7 +81,7 @@ mhe_status mhi_run_check_transform(mhi_run *run, mhe_error *err) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, mhi_node_find(section, "scale"),
                            "data.transform: 'scale' cannot be 0");
     }
-    const double angle = degrees * acos(-1) / 180, s = sin(angle), c = cos(angle);
+    const double angle = degrees * MHI_PI / 180, s = sin(angle), c = cos(angle);
     const double exact_s = fabs(s) < 1e-15 ? 0 : s, exact_c = fabs(c) < 1e-15 ? 0 : c;
     for (int32_t i = 0; i < 3; i++) { /* Rodrigues */
         for (int32_t k = 0; k < 3; k++) {

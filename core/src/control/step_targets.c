@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* step_targets.c: what a step is to be close to: an earlier step's result or a file. */
+#include "base/pi.h"
 #include "config/options_value.h"
 #include "control/step_private.h"
 #include "estimator/columns.h"
@@ -87,7 +88,7 @@ static mhe_status from_file(mhi_step_work *w, const char *signal, const mhi_part
         for (int32_t i = 0; i < part->n; i++) {
             const double time = table->time[0] + k * w->interval;
             const int angle = strncmp(part->units[i], "rad", 3) == 0;
-            const double scale = table->in_degrees && angle ? acos(-1) / 180 : 1;
+            const double scale = table->in_degrees && angle ? MHI_PI / 180 : 1;
             target(w, signal, k)[i] =
                 column[i] < 0 ? NAN : scale * mhi_column_at(table, column[i], time, part->in_u);
         }

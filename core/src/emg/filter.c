@@ -2,20 +2,20 @@
 /* filter.c: design, one step and delay. */
 #include "emg/filter.h"
 
+#include "base/pi.h"
+
 #include <complex.h>
 #include <math.h>
 
-#define PI 3.14159265358979323846
-
 /* Pole `k` of the analogue low-pass with corner 1 rad/s: on the unit circle, left half. */
 static double complex prototype_pole(int32_t order, int32_t k) {
-    return cexp(I * PI * (2.0 * k + order + 1) / (2.0 * order));
+    return cexp(I * MHI_PI * (2.0 * k + order + 1) / (2.0 * order));
 }
 
 /* A digital frequency (Hz) on the analogue axis that the bilinear transform s = 2 (z-1)/(z+1)
  * folds onto the unit circle. */
 static double prewarp(double frequency, double rate) {
-    return 2 * tan(PI * frequency / rate);
+    return 2 * tan(MHI_PI * frequency / rate);
 }
 
 static double complex to_digital(double complex s) {
@@ -74,7 +74,7 @@ mhe_status mhi_filter_low_pass(int32_t order, double corner, double rate, mhi_fi
 }
 
 double mhi_filter_band_centre(double low, double high, double rate) {
-    return rate / PI * atan(sqrt(prewarp(low, rate) * prewarp(high, rate)) / 2);
+    return rate / MHI_PI * atan(sqrt(prewarp(low, rate) * prewarp(high, rate)) / 2);
 }
 
 mhe_status mhi_filter_band_pass(int32_t order, double low, double high, double rate,
@@ -91,7 +91,8 @@ mhe_status mhi_filter_band_pass(int32_t order, double low, double high, double r
                         low, high, rate);
     }
     const double a = prewarp(low, rate), b = prewarp(high, rate);
-    const double complex z1 = cexp(-2 * I * PI * mhi_filter_band_centre(low, high, rate) / rate);
+    const double complex z1 =
+        cexp(-2 * I * MHI_PI * mhi_filter_band_centre(low, high, rate) / rate);
     for (int32_t k = 0; k < (order + 1) / 2; k++) {
         /* s -> (s^2 + a b) / ((b - a) s) makes two poles of one */
         const double complex half = (b - a) / 2 * prototype_pole(order, k);
@@ -129,7 +130,7 @@ static double polynomial_delay(double c0, double c1, double c2, double complex z
 }
 
 double mhi_filter_delay(const mhi_filter *filter, double frequency, double rate) {
-    const double complex z1 = cexp(-2 * I * PI * frequency / rate);
+    const double complex z1 = cexp(-2 * I * MHI_PI * frequency / rate);
     double delay = 0;
     for (int32_t i = 0; i < filter->n; i++) {
         const mhi_biquad *s = &filter->sections[i];

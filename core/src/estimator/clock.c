@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/clock.h"
 
+#include "base/values.h"
 #include "estimator/recording.h"
 
 #include <math.h>
@@ -10,12 +11,6 @@
 #define FOLLOW 0.1 /* part of a frame's distance from the grid by which the grid moves */
 #define BEHIND 1.5 /* intervals: that much too early, frames must come faster than thought */
 #define GAP 1.5    /* intervals: a longer step is a gap */
-
-double mhi_now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 mhe_status mhi_frame_clock_create(mhi_frame_clock *c, int32_t n, int32_t ratio, double interval,
                                   mhi_arena *arena, mhe_error *err) {
@@ -75,18 +70,13 @@ mhe_status mhi_frame_clock_take(mhi_frame_clock *c, double time, mhi_tick *tick,
     return MHE_OK;
 }
 
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 mhe_status mhi_frame_clock_measure(mhi_frame_clock *c, const double *times, int32_t *gap,
                                    mhe_error *err) {
     int32_t n_gaps = 0, last_gap = 0;
     for (int32_t k = 0; k < c->n; k++) {
         c->steps[k] = times[k + 1] - times[k];
     }
-    qsort(c->steps, (size_t)c->n, sizeof *c->steps, by_value);
+    mhi_sort(c->steps, c->n);
     const double median = c->steps[c->n / 2], mean = (times[c->n] - times[0]) / c->n;
     const double longest = c->ratio / MHI_SLOWEST;
     *gap = 0;

@@ -43,6 +43,5 @@ mhe_status mhi_frame_clock_measure(mhi_frame_clock *clock, const double *times, 
                                    mhe_error *err);
 /* The interval is not known; the frames are counted anew. */
 void mhi_frame_clock_forget(mhi_frame_clock *clock);
-double mhi_now(void); /* s of CLOCK_MONOTONIC */
 
 #endif

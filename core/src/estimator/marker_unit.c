@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/marker_unit.h"
 
+#include "base/values.h"
+
 #include <math.h>
 #include <stdlib.h>
 
@@ -11,11 +13,6 @@
 static double distance(const double *a, const double *b) {
     return sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) +
                 (a[2] - b[2]) * (a[2] - b[2]));
-}
-
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
 }
 
 /* Median, over pairs of markers on one body and over frames, of the measured distance divided by
@@ -39,7 +36,7 @@ static double marker_scale(const mhe_description *model, const double *markers, 
     }
     double median = NAN;
     if (n > 0) {
-        qsort(ratios, (size_t)n, sizeof *ratios, by_value);
+        mhi_sort(ratios, n);
         median = ratios[n / 2];
     }
     free(ratios);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/estimator_private.h"
 
+#include "base/clock.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,7 +75,7 @@ void mhi_pace_postures(mhe_estimator *e, int32_t begun) {
 }
 
 int32_t mhi_pace_over(mhe_estimator *e) {
-    return by_clock(e) ? mhi_now() >= e->pace.arrival + e->pace.budget
+    return by_clock(e) ? mhi_seconds() >= e->pace.arrival + e->pace.budget
                        : mhi_work_spent(mhi_ocp_work(e->ocp));
 }
 

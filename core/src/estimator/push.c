@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* push.c: frames in, estimates out. */
+#include "base/clock.h"
 #include "base/need.h"
 #include "estimator/estimator_private.h"
 
@@ -16,13 +17,13 @@ mhe_status mhe_estimator_prepare(mhe_estimator *e, mhe_error *err) {
         e->window.filled < e->window.n) {
         return status;
     }
-    const double begin = mhi_now();
+    const double begin = mhi_seconds();
     mhi_pace_prepare(e);
     mhi_window_follow(e);
     if (e->solver->prepare != NULL && mhi_phase_settled(e)) {
         status = e->solver->prepare(e->solver_self, &e->window.solution, err);
     }
-    mhi_pace_prepared(e, mhi_now() - begin);
+    mhi_pace_prepared(e, mhi_seconds() - begin);
     return status;
 }
 
@@ -150,7 +151,7 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
     if (status == MHE_OK) {
         mhi_trust_solved(e, estimate->status);
         status = mhi_output_give(e, e->node, estimate, err);
-        estimate->latency = mhi_now() - e->pace.arrival;
+        estimate->latency = mhi_seconds() - e->pace.arrival;
         estimate->solve_time = estimate->latency + e->pace.ahead;
         estimate->iterations = info.iterations;
         estimate->kkt_residual = info.kkt_residual;
@@ -180,7 +181,7 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     if (status != MHE_OK) {
         return status;
     }
-    e->pace.arrival = mhi_now();
+    e->pace.arrival = mhi_seconds();
     mhi_pace_begin(e);
     status = find_node(e, ours.time, &used, err);
     if (status != MHE_OK) {

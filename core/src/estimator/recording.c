@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/recording_private.h"
 
+#include "base/pi.h"
 #include "believe/believe.h"
 #include "estimator/marker_unit.h"
 #include "io/motion_file.h"
@@ -46,7 +47,7 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
 
 /* Angles of a file in degrees. */
 static void to_radians(double *values, int32_t n_frames, const mhe_description *d) {
-    const double factor = acos(-1) / 180;
+    const double factor = MHI_PI / 180;
     for (ptrdiff_t i = 0; i < (ptrdiff_t)n_frames * d->n_coordinates; i++) {
         values[i] *= d->coordinates[i % d->n_coordinates].rotational ? factor : 1;
     }

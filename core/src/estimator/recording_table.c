@@ -3,6 +3,7 @@
 #include "estimator/recording_private.h"
 
 #include "base/text.h"
+#include "base/values.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -77,11 +78,6 @@ mhe_status mhi_recording_check_table(const mhi_table *table, const mhe_host *hos
 #define GAP 1.5     /* steps: a longer one is a gap, as in clock.c */
 #define GAPS_TOLD 3 /* then only their number */
 
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Median step between frames; NaN without. */
 static double median_step(const mhi_recording *r) {
     const int32_t n = r->n_frames - 1;
@@ -90,7 +86,7 @@ static double median_step(const mhi_recording *r) {
         steps[k] = r->time[k + 1] - r->time[k];
     }
     if (steps != NULL) {
-        qsort(steps, (size_t)n, sizeof *steps, by_value);
+        mhi_sort(steps, n);
         median = steps[n / 2];
     }
     free(steps);

@@ -2,6 +2,9 @@
 /* solve.c: solves a prepared window within its time, and says what came of it. */
 #include "estimator/estimator_private.h"
 
+#include "base/clock.h"
+#include "base/values.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -14,15 +17,6 @@
  * model: largest jump between intervals that may remain, rad, rad/s, 1. Else its states would start
  * the next window and the error would stay. */
 #define CONSISTENT 1e-2
-
-static int all_finite(const double *values, ptrdiff_t n) {
-    for (ptrdiff_t i = 0; i < n; i++) {
-        if (!isfinite(values[i])) {
-            return 0;
-        }
-    }
-    return 1;
-}
 
 static void take_back_guess(mhe_estimator *e) {
     memcpy(e->window.solution.x, e->window.guess_x,
@@ -51,7 +45,7 @@ static void predict(mhe_estimator *e) {
         mhe_status status =
             mhi_ocp_predict(e->ocp, k, mhi_row(e->window.solution.x, k, e->window.n_x),
                             mhi_row(e->window.solution.u, k, e->n_u), next, NULL);
-        if (status != MHE_OK || !all_finite(next, e->window.n_x)) {
+        if (status != MHE_OK || !mhi_all_finite(next, e->window.n_x)) {
             memcpy(next, mhi_row(e->window.guess_x, k + 1, e->window.n_x),
                    sizeof(double) * (size_t)e->window.n_x);
         }
@@ -187,8 +181,8 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
         tell_failure(e, why.text);
     }
     const int finite =
-        all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->window.n_x) &&
-        all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);
+        mhi_all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->window.n_x) &&
+        mhi_all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);
     const int begun = info->iterations > 0 || info->outcome == MHE_SOLVE_CONVERGED;
     const int usable = status == MHE_OK && finite && begun && info->primal_residual <= CONSISTENT;
     *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;

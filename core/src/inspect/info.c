@@ -4,6 +4,7 @@
 
 #include "base/need.h"
 #include "base/number.h"
+#include "base/pi.h"
 #include "io/model_file.h"
 
 #include <mhe/inspect.h>
@@ -31,7 +32,7 @@ const char *mhi_info_muscle_type(int32_t type) {
 
 /* Angles of a range in degrees: what a reader has in mind. */
 static void add_range(mhi_text *out, const mhe_coordinate *c) {
-    const double unit = c->rotational ? 180 / acos(-1) : 1;
+    const double unit = c->rotational ? 180 / MHI_PI : 1;
     const char *name = c->rotational ? "deg" : "m";
     if (isfinite(c->lower) || isfinite(c->upper)) {
         mhi_text_add(out, "%.4g .. %.4g %s, default %.4g", c->lower * unit, c->upper * unit, name,
@@ -61,7 +62,7 @@ static void add_coordinates(mhi_text *out, const mhe_description *d) {
     for (int32_t i = 0; i < d->n_constants; i++) {
         const mhe_constant *c = &d->constants[i];
         mhi_text_add(out, "  %-28s %.4g %s\n", c->name,
-                     c->rotational ? c->value * 180 / acos(-1) : c->value,
+                     c->rotational ? c->value * 180 / MHI_PI : c->value,
                      c->rotational ? "deg" : "m");
     }
 }

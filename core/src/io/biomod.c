@@ -2,6 +2,7 @@
 /* biomod.c: .bioMod reader (biorbd, versions 1 to 4): header, segments, markers. */
 #include "io/biomod.h"
 #include "base/number.h"
+#include "base/pi.h"
 #include "io/model_file.h"
 
 #include <ctype.h>
@@ -227,8 +228,8 @@ static void add_coordinates(mhi_biomod *m, segment *s, int32_t kind, const char 
         }
         if (kind == MHE_MOTION_ROTATION) {
             draft->coordinate.rotational = 1;
-            draft->coordinate.lower = -acos(-1);
-            draft->coordinate.upper = acos(-1);
+            draft->coordinate.lower = -MHI_PI;
+            draft->coordinate.upper = MHI_PI;
         }
         const double axis[3] = {axes[i] == 'x', axes[i] == 'y', axes[i] == 'z'};
         mhi_build_motion(b, s->draft, kind, at, axis, mhi_function_identity(b), s->opened.line);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "io/biomod_lex.h"
 
+#include "base/pi.h"
+
 #include <ctype.h>
 #include <math.h>
 #include <stdlib.h>
@@ -163,7 +165,7 @@ static double factor(expression *e) {
         value = variable(e);
     } else if (tolower((unsigned char)e->at[0]) == 'p' && tolower((unsigned char)e->at[1]) == 'i') {
         e->at += 2;
-        value = acos(-1);
+        value = MHI_PI;
     } else if (isdigit((unsigned char)*e->at) || *e->at == '.') {
         char *end;
         value = strtod(e->at, &end);

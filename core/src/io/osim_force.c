@@ -2,6 +2,8 @@
 /* osim_force.c: forces other than muscles. */
 #include "io/osim.h"
 
+#include "base/pi.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -34,7 +36,7 @@ static void read_limit(mhi_osim *o, xmlNode *node) {
     (void)mhi_xml_numbers(o, node, "transition", &l.transition, 1);
     const mhi_coordinate_draft *draft = o->b.coordinates.items[coordinate];
     if (draft->coordinate.rotational) {
-        const double degree = acos(-1) / 180;
+        const double degree = MHI_PI / 180;
         l.upper *= degree;
         l.lower *= degree;
         l.transition *= degree;

@@ -2,6 +2,8 @@
 /* table_times.c: when the rows were measured, and how many come in a second. */
 #include "io/table_reader.h"
 
+#include "base/values.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -116,11 +118,6 @@ static mhe_status drop_equal(mhi_table_reader *reader) {
     return MHE_OK;
 }
 
-static int by_value(const void *a, const void *b) {
-    double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 /* Rows per second by the median step, or by the mean where the steps differ by rounding alone; 0
  * where there is no step. */
 static mhe_status measure_rate(const mhi_table_reader *reader, double *rate) {
@@ -137,7 +134,7 @@ static mhe_status measure_rate(const mhi_table_reader *reader, double *rate) {
     for (int32_t i = 0; i < n; i++) {
         steps[i] = table->time[i + 1] - table->time[i];
     }
-    qsort(steps, (size_t)n, sizeof *steps, by_value);
+    mhi_sort(steps, n);
     double span = table->time[n] - table->time[0];
     *rate = steps[n - 1] < 1.5 * steps[0] ? n / span : 1 / steps[n / 2];
     free(steps);

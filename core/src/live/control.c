@@ -2,6 +2,7 @@
 /* control.c: requests of sinks (stop, record, maximal contractions), and the state of the run. */
 #include "live/live_private.h"
 
+#include "base/clock.h"
 #include "base/text.h"
 
 #include <cJSON.h>
@@ -100,7 +101,7 @@ static void begin_mvc(mhe_live *l, const char *name) {
         if (strcmp(l->run->emg.channels[i].name, name) == 0 &&
             mhi_electrodes_peak(in->electrodes, i, 1, &before)) {
             l->mvc_channel = i;
-            l->mvc_began = mhi_live_now();
+            l->mvc_began = mhi_seconds();
         }
     }
 }
@@ -228,7 +229,7 @@ static void add_electrodes(mhe_live *l, cJSON *root) {
         cJSON *m = cJSON_AddObjectToObject(root, "mvc");
         cJSON_AddStringToObject(m, "name", l->run->emg.channels[l->mvc_channel].name);
         cJSON_AddNumberToObject(m, "max", isfinite(peak) ? peak : 0);
-        cJSON_AddNumberToObject(m, "seconds", mhi_live_now() - l->mvc_began);
+        cJSON_AddNumberToObject(m, "seconds", mhi_seconds() - l->mvc_began);
     }
     if (l->mvc_file[0] != '\0') {
         cJSON_AddStringToObject(root, "mvc_file", l->mvc_file);

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "live/intake.h"
 
+#include "base/clock.h"
+
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -25,12 +27,6 @@ struct mhi_intake {
     mhe_status status;
     mhe_error why;
 };
-
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void set_state(mhi_intake *in, int32_t ready, int32_t ended, mhe_status status,
                       const mhe_error *why) {
@@ -107,7 +103,7 @@ static mhe_status open_source(mhi_intake *in, mhe_error *err) {
     mhe_status status = MHE_RETRY;
     while (status == MHE_RETRY && !stopped(in)) {
         mhe_error why = {0};
-        status = in->ops->open(in->self, now() + OPEN_TRY, &why);
+        status = in->ops->open(in->self, mhi_seconds() + OPEN_TRY, &why);
         if (status == MHE_RETRY) {
             set_state(in, 0, 0, MHE_OK, &why);
             rest(PAUSE);
@@ -128,7 +124,7 @@ static void *run(void *data) {
     }
     int32_t ended = 0;
     while (status == MHE_OK && !stopped(in) && !ended) {
-        status = in->ops->read(in->self, now() + READ_TRY, &taker, &err);
+        status = in->ops->read(in->self, mhi_seconds() + READ_TRY, &taker, &err);
         (void)mhi_intake_status(in, &ended, NULL);
     }
     if (status != MHE_OK && !stopped(in)) {

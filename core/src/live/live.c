@@ -2,6 +2,7 @@
 /* live.c: the run: packets in, estimates out, requests in between. */
 #include "live/live_private.h"
 
+#include "base/clock.h"
 #include "config/tree.h"
 #include "estimator/create.h"
 #include "live/recorded.h"
@@ -14,12 +15,6 @@
 #define LOOK 0.02        /* s of one wait for a packet */
 #define STATE_EVERY 0.25 /* s */
 #define TELL_EVERY 5.0   /* s between two lines about what is missing */
-
-double mhi_live_now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* ---- the host that sources and sinks see ---- */
 
@@ -254,13 +249,13 @@ static mhe_status check_sources(mhe_live *l, int32_t *n_ended, mhe_error *err) {
 }
 
 static mhe_status wait_for_streams(mhe_live *l, mhe_error *err) {
-    const double begin = mhi_live_now();
+    const double begin = mhi_seconds();
     double told = begin + 1 - TELL_EVERY;
     char missing[1024];
     int32_t ended = 0;
     mhe_status status = MHE_OK;
     while (status == MHE_OK && !stopped(l) && list_missing(l, missing, sizeof missing) > 0) {
-        const double now = mhi_live_now();
+        const double now = mhi_seconds();
         if (now - told > TELL_EVERY) {
             char line[1200];
             (void)snprintf(line, sizeof line, "waiting for %s", missing);
@@ -277,7 +272,7 @@ static mhe_status wait_for_streams(mhe_live *l, mhe_error *err) {
     }
     /* descriptions come before what they describe: take those that wait */
     while (status == MHE_OK && l->feed.n_inlets == 0 && !stopped(l)) {
-        mhi_packet *p = mhi_mailbox_take(l->box, mhi_live_now() + LOOK);
+        mhi_packet *p = mhi_mailbox_take(l->box, mhi_seconds() + LOOK);
         status = p == NULL ? check_sources(l, &ended, err) : take_packet(l, p, err);
         if (p == NULL && ended == l->run->sources.n) {
             break;
@@ -297,7 +292,7 @@ mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
     double state_told = 0;
     int32_t ended = 0;
     while (status == MHE_OK && !stopped(l)) {
-        const double now = mhi_live_now();
+        const double now = mhi_seconds();
         const int idle = mhi_mailbox_waiting(l->box) == 0;
         if (idle && l->work) { /* the time until the next frame */
             l->work = 0;
@@ -334,8 +329,8 @@ mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
 /* All streams that were described so far decide what drives the run. */
 mhe_status mhi_live_begin(mhe_live *l, mhe_error *err) {
     mhe_status status = MHE_OK;
-    const double until = mhi_live_now() + 0.2;
-    while (status == MHE_OK && mhi_live_now() < until) { /* what else is described at the start */
+    const double until = mhi_seconds() + 0.2;
+    while (status == MHE_OK && mhi_seconds() < until) { /* what else is described at the start */
         int32_t n = 0;
         for (int32_t i = 0; i < l->run->sources.n; i++) {
             n += mhi_feed_inlet(&l->feed, i, 0) != NULL;
@@ -343,7 +338,7 @@ mhe_status mhi_live_begin(mhe_live *l, mhe_error *err) {
         if (n == l->run->sources.n) {
             break;
         }
-        mhi_packet *p = mhi_mailbox_take(l->box, mhi_live_now() + LOOK);
+        mhi_packet *p = mhi_mailbox_take(l->box, mhi_seconds() + LOOK);
         status = p == NULL ? MHE_OK : take_packet(l, p, err);
     }
     status = status == MHE_OK ? mhi_feed_begin(&l->feed, err) : status;

@@ -53,7 +53,6 @@ struct mhe_live {
     int32_t state_length;
 };
 
-double mhi_live_now(void);
 mhe_status mhi_live_begin(mhe_live *live, mhe_error *err);
 void mhi_live_end_record(mhe_live *live, const char *why); /* NULL: as was wished */
 

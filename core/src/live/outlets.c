@@ -2,6 +2,7 @@
 #include "live/outlets.h"
 
 #include "base/arena.h"
+#include "base/clock.h"
 #include "live/ring.h"
 
 #include <math.h>
@@ -59,12 +60,6 @@ struct mhi_outlets {
     int32_t markers_channel, emg_channel;
     atomic_int stop;
 };
-
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* ---- the signals ---- */
 
@@ -167,7 +162,7 @@ void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
 
 static void count(outlet *s, double stamp, int64_t lost) {
     (void)pthread_mutex_lock(&s->mutex);
-    s->latency[s->taken % LATENCIES] = now() - stamp;
+    s->latency[s->taken % LATENCIES] = mhi_seconds() - stamp;
     s->taken++;
     s->lost = lost;
     (void)pthread_mutex_unlock(&s->mutex);

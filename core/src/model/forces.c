@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* forces.c: the force plugins of a system. */
+#include "base/values.h"
 #include "io/external_loads.h"
 #include "model/system_private.h"
 #include "plugin/instance.h"
@@ -182,14 +183,6 @@ static void zero(double *values, int32_t n) {
     memset(values, 0, sizeof(double) * (size_t)n);
 }
 
-static int all_finite(const double *values, int32_t n) {
-    double sum = 0;
-    for (int32_t i = 0; i < n; i++) {
-        sum += values[i] * 0.0;
-    }
-    return sum == 0;
-}
-
 static void add(double *to, const double *from, int32_t n) {
     for (int32_t i = 0; i < n; i++) {
         to[i] += from[i];
@@ -236,8 +229,9 @@ static mhe_status evaluate_one(mhi_system_context *c, const mhi_force *f,
         return mhe_fail(err, MHE_E_INPUT, "%s: no inputs are known here", f->plugin->id);
     }
     mhe_status status = f->ops->evaluate(f->self, &point, &out, err);
-    const int finite = (!l->generalised || all_finite(c->own, n_q)) &&
-                       all_finite(c->tension, l->n_paths) && all_finite(c->load, 9 * l->n_loads);
+    const int finite = (!l->generalised || mhi_all_finite(c->own, n_q)) &&
+                       mhi_all_finite(c->tension, l->n_paths) &&
+                       mhi_all_finite(c->load, 9 * l->n_loads);
     return status == MHE_OK && !finite
                ? mhe_fail(err, MHE_RETRY, "%s: a force is not finite", f->plugin->id)
                : status;

@@ -2,6 +2,8 @@
 /* emg.c: from excitations to recorded EMG. */
 #include "noise/parts.h"
 
+#include "base/pi.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -16,7 +18,7 @@ static void harmonic_moments(int32_t i, double c, double level, double *mean, do
 
 /* cos(2 pi i k / n), the angle reduced exactly before it is rounded. */
 static double wave(int32_t i, int32_t k, int32_t n) {
-    return cos(2 * acos(-1) * (double)((int64_t)i * k % n) / n);
+    return cos(2 * MHI_PI * (double)((int64_t)i * k % n) / n);
 }
 
 void mhi_noise_harmonics(double *signal, int32_t n, int32_t stride, double level, int32_t seed,

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "noise/random.h"
 
+#include "base/pi.h"
+
 #include <math.h>
 
 #define ROUNDS 10
@@ -28,5 +30,5 @@ double mhi_random_normal(const mhi_stream *stream, uint64_t index) {
     uint32_t c[4] = {(uint32_t)index, (uint32_t)(index >> 32), stream->channel, stream->kind};
     mhi_philox(c, stream->seed);
     const double radius = sqrt(-2 * log(uniform(c[0], c[1]) + 0x1p-53)); /* never log(0) */
-    return radius * cos(2 * acos(-1) * uniform(c[2], c[3]));
+    return radius * cos(2 * MHI_PI * uniform(c[2], c[3]));
 }

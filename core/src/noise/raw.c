@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* raw.c: from excitations to raw EMG of electrodes. */
+#include "base/pi.h"
 #include "emg/filter.h"
 #include "noise/parts.h"
 
@@ -56,7 +57,7 @@ static void record_electrode(const mhi_noise *noise, const mhi_recording *r, int
             sum += fraction[i] * e[i];
         }
         out->values[(ptrdiff_t)k * out->n_channels + channel] =
-            mvc * sqrt(acos(-1) / 2) * sum * c->gain * n +
+            mvc * sqrt(MHI_PI / 2) * sum * c->gain * n +
             raw->amplifier_sd * mhi_random_normal(&rest, (uint64_t)k);
     }
 }

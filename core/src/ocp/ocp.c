@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ocp/ocp_private.h"
 
+#include "base/values.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -27,14 +29,6 @@ const char *const *mhi_ocp_entry_names(const mhe_problem *problem, int32_t signa
     return signal < 0 || signal >= MHI_N_SIGNALS || ocp->signals.signal[signal].n_y == 0
                ? NULL
                : ocp->entry_names[signal];
-}
-
-static int all_finite(const double *values, int32_t n) {
-    double sum = 0;
-    for (int32_t i = 0; i < n; i++) {
-        sum += values[i] - values[i]; /* NaN for NaN and infinities */
-    }
-    return sum == 0;
 }
 
 /* Full square block [n x n] from the lower triangle of rows of length n_z. */
@@ -125,7 +119,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     if (k == 0) {
         add_prior(ocp, x, n_z, &sum);
     }
-    if (derivatives && !all_finite(w->gradient, n_z)) {
+    if (derivatives && !mhi_all_finite(w->gradient, n_z)) {
         return mhe_fail(err, MHE_RETRY, "a derivative of the costs is not finite");
     }
     if (out->cost != NULL) {
@@ -159,7 +153,7 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
     if (ocp->stop != NULL && atomic_load_explicit(ocp->stop, memory_order_relaxed)) {
         return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted");
     }
-    if (!all_finite(x, problem->n_x) || (u != NULL && !all_finite(u, problem->n_u))) {
+    if (!mhi_all_finite(x, problem->n_x) || (u != NULL && !mhi_all_finite(u, problem->n_u))) {
         return mhe_fail(err, MHE_RETRY, "a state or control is not finite");
     }
     mhe_status status = MHE_OK;

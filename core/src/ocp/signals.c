@@ -19,16 +19,16 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     const int32_t n_r = residual != NULL ? residual->count : 0;
     *signals = (mhi_signals){
         .signal = {
-            [MHI_SIGNAL_MARKERS] = {"markers", "m", 3 * n_k, 0, 0, n_q, 0, 0},
-            [MHI_SIGNAL_Q] = {"q", "rad", n_q, 0, 0, 0, 0, 0},
-            [MHI_SIGNAL_QDOT] = {"qdot", "rad/s", n_q, 0, qdot, 0, 0, 0},
+            [MHI_SIGNAL_MARKERS] = {"markers", "m", 3 * n_k, 0, 0, n_q, 0, 0, 1},
+            [MHI_SIGNAL_Q] = {"q", "rad", n_q, 0, 0, 0, 0, 0, 1},
+            [MHI_SIGNAL_QDOT] = {"qdot", "rad/s", n_q, 0, qdot, 0, 0, 0, 1},
             [MHI_SIGNAL_ACTIVATION] = {"activation", "1", n_m, 0,
-                                       driven ? activation->first : f->n_x, 0, !driven, 0},
-            [MHI_SIGNAL_EXCITATION] = {"excitation", "1", driven ? n_m : 0, 0, f->n_x, 0, 1, 0},
-            [MHI_SIGNAL_MUSCLE_FORCE] = {"muscle_force", "N", n_m, 0, 0, all, !driven, 0},
-            [MHI_SIGNAL_JOINT_MOMENT] = {"joint_moment", "N m", n_q, 0, 0, all, !driven, 0},
+                                       driven ? activation->first : f->n_x, 0, !driven, 0, 1},
+            [MHI_SIGNAL_EXCITATION] = {"excitation", "1", driven ? n_m : 0, 0, f->n_x, 0, 1, 0, 1},
+            [MHI_SIGNAL_MUSCLE_FORCE] = {"muscle_force", "N", n_m, 0, 0, all, !driven, 0, 1},
+            [MHI_SIGNAL_JOINT_MOMENT] = {"joint_moment", "N m", n_q, 0, 0, all, !driven, 0, 1},
             [MHI_SIGNAL_RESIDUAL_TORQUE] = {"residual_torque", "N m", n_r, 0,
-                                            f->n_x + (n_r > 0 ? residual->first : 0), 0, 1, 0},
+                                            f->n_x + (n_r > 0 ? residual->first : 0), 0, 1, 0, 1},
         }};
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         mhi_signal *s = &signals->signal[i];
