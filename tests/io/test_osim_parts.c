@@ -439,6 +439,43 @@ static void muscle_curves_of_the_file(void **state) {
     mhi_description_free(d);
 }
 
+#define CONNECTOR(name, to)                                           \
+    "<Connector_PhysicalFrame_ name=\"" name "\"><connectee_name>" to \
+    "</connectee_name></Connector_PhysicalFrame_>"
+
+/* 30501: the joint stands beside its bodies, its place in them in itself; forces among components.
+ */
+static void layouts_between_3_and_4(void **state) {
+    (void)state;
+    mhe_description *d = parse(DOCUMENT(SET("BodySet", BODY("a", "")) SET(
+        "JointSet",
+        "<PinJoint name=\"i\"><connectors>" CONNECTOR("parent_body", "../ground") CONNECTOR(
+            "child_body",
+            "../a") "</connectors><location_in_parent>1 2 3"
+                    "</location_in_parent><location_in_child>0 0.5 "
+                    "0</location_in_child></PinJoint>\n") "<components><IMU "
+                                                          "name=\"u\"/><RigidTendonMuscle "
+                                                          "name=\"m\"><GeometryPath><PathPointSet>"
+                                                          "<objects>" POINT("a", "0 0 0") POINT(
+                                                              "a",
+                                                              "0 1 0") "</objects></PathPointSet></"
+                                                                       "GeometryPath><force_"
+                                                                       "velocity_curve><Constant><"
+                                                                       "value>1</value>"
+                                                                       "</Constant></"
+                                                                       "force_velocity_curve></"
+                                                                       "RigidTendonMuscle></"
+                                                                       "components>\n"));
+    assert_int_equal(d->bodies[0].parent, -1);
+    assert_near(d->bodies[0].joint_p[2], 3, 0);
+    assert_near(d->bodies[0].body_p[1], -0.5, 0);
+    assert_int_equal(d->n_muscles, 1);
+    assert_near(mhi_function_value(&d->muscles[0].passive_force_length, 1.3), 0.26, 1e-15);
+    assert_near(mhi_function_value(&d->muscles[0].active_force_length, 1.045), 0.993333, 1e-15);
+    assert_int_equal(d->n_unsupported, 0);
+    mhi_description_free(d);
+}
+
 /* What OpenSim writes and XML with namespaces dislikes. */
 static void names_with_colons(void **state) {
     (void)state;
@@ -463,6 +500,7 @@ int main(void) {
         cmocka_unit_test(forces_in_their_units),
         cmocka_unit_test(paths_given_as_polynomials),
         cmocka_unit_test(muscle_curves_of_the_file),
+        cmocka_unit_test(layouts_between_3_and_4),
         cmocka_unit_test(names_with_colons)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

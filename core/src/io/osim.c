@@ -20,9 +20,10 @@ static void drop_set(mhi_osim *o, const char *set, const char *why) {
 }
 
 static void list_components(mhi_osim *o, xmlNode *holder) {
-    static const char *const harmless[] = {"PhysicalOffsetFrame", "Station", "Marker"};
+    static const char *const harmless[] = {"PhysicalOffsetFrame", "Station", "Marker", "IMU"};
     for (xmlNode *n = mhi_xml_first(holder); n != NULL; n = mhi_xml_next(n)) {
-        if (!mhi_xml_one_of(n, harmless, sizeof harmless / sizeof *harmless)) {
+        if (!mhi_xml_one_of(n, harmless, sizeof harmless / sizeof *harmless) &&
+            !mhi_osim_force(o, n)) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "component %s '%s': left out",
                                   (const char *)n->name, mhi_xml_name(o, n));
         }

@@ -114,5 +114,7 @@ int32_t mhi_osim_path(mhi_osim *o, xmlNode *object, const char *what, mhi_path_d
 int32_t mhi_osim_is_muscle(const xmlNode *node);
 void mhi_osim_muscle(mhi_osim *o, xmlNode *node);
 void mhi_osim_forces(mhi_osim *o);
+/* A force or muscle wherever it stands; 0: this is none that is known. */
+int32_t mhi_osim_force(mhi_osim *o, xmlNode *node);
 
 #endif

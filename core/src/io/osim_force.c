@@ -251,7 +251,7 @@ static void read_point_actuator(mhi_osim *o, xmlNode *node) {
 
 /* ---- all of them ---- */
 
-static void read_force(mhi_osim *o, xmlNode *node) {
+int32_t mhi_osim_force(mhi_osim *o, xmlNode *node) {
     static const struct {
         const char *tag;
         void (*read)(mhi_osim *, xmlNode *);
@@ -272,33 +272,37 @@ static void read_force(mhi_osim *o, xmlNode *node) {
         "HuntCrossleyForce",    "ElasticFoundationForce",  "SmoothSphereHalfSpaceForce",
         "MeyerFregly2016Force", "ExponentialContactForce", "ExponentialContact",
         "PrescribedForce",      "ExternalForce",           "ExternalLoads"};
-    for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
-        if (mhi_xml_is(node, kinds[i].tag)) {
-            kinds[i].read(o, node);
-            return;
-        }
+    size_t kind = 0;
+    while (kind < sizeof kinds / sizeof *kinds && !mhi_xml_is(node, kinds[kind].tag)) {
+        kind++;
     }
-    if (mhi_xml_one_of(node, forward, sizeof forward / sizeof *forward)) {
+    const int32_t read = kind < sizeof kinds / sizeof *kinds, muscle = mhi_osim_is_muscle(node);
+    const int32_t in_forward = mhi_xml_one_of(node, forward, sizeof forward / sizeof *forward);
+    if (!read && !muscle && !in_forward) {
+        return 0;
+    }
+    if (!mhi_xml_enabled(o, node)) {
+        mhi_build_warn(&o->b, mhi_xml_line(node), "%s '%s' is switched off: skipped",
+                       (const char *)node->name, mhi_xml_name(o, node));
+    } else if (muscle) {
+        mhi_osim_muscle(o, node);
+    } else if (read) {
+        kinds[kind].read(o, node);
+    } else {
         mhi_build_dropped(&o->b, mhi_xml_line(node),
                           "%s '%s': contact and prescribed forces act in a forward simulation "
                           "only; measured loads come with the recording",
                           (const char *)node->name, mhi_xml_name(o, node));
-    } else {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node), "%s '%s': its force is missing",
-                              (const char *)node->name, mhi_xml_name(o, node));
     }
+    return 1;
 }
 
 void mhi_osim_forces(mhi_osim *o) {
     for (xmlNode *n = mhi_xml_objects(o->model, "ForceSet"); n != NULL && o->b.status == MHE_OK;
          n = mhi_xml_next(n)) {
-        if (!mhi_xml_enabled(o, n)) {
-            mhi_build_warn(&o->b, mhi_xml_line(n), "%s '%s' is switched off: skipped",
-                           (const char *)n->name, mhi_xml_name(o, n));
-        } else if (mhi_osim_is_muscle(n)) {
-            mhi_osim_muscle(o, n);
-        } else {
-            read_force(o, n);
+        if (!mhi_osim_force(o, n) && mhi_xml_enabled(o, n)) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "%s '%s': its force is missing",
+                                  (const char *)n->name, mhi_xml_name(o, n));
         }
     }
 }

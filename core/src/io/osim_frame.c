@@ -62,6 +62,16 @@ void mhi_osim_frames(mhi_osim *o) {
     }
 }
 
+/* Between 3.3 and 4.0: <connectors><Connector_.. name="parent_frame"><connectee_name>. */
+static const char *connector(mhi_osim *o, xmlNode *object, const char *name) {
+    xmlNode *node = mhi_xml_first(mhi_xml_child(object, "connectors"));
+    while (node != NULL && strcmp(mhi_xml_name(o, node), name) != 0) {
+        node = mhi_xml_next(node);
+    }
+    const char *text = mhi_xml_text(o, mhi_xml_child(node, "connectee_name"));
+    return *text != '\0' ? text : NULL;
+}
+
 const char *mhi_osim_socket(mhi_osim *o, xmlNode *object, const char *name) {
     static const struct {
         const char *before, *after;
@@ -73,7 +83,7 @@ const char *mhi_osim_socket(mhi_osim *o, xmlNode *object, const char *name) {
         (void)snprintf(tag, sizeof tag, "%s%s%s", spellings[i].before, name, spellings[i].after);
         text = mhi_xml_word(o, object, tag);
     }
-    return text;
+    return text != NULL ? text : connector(o, object, name);
 }
 
 /* "../ground" seen from "/jointset/elbow" -> "/jointset/ground"; an absolute path as it is. */

@@ -2,6 +2,7 @@
 /* osim_joint.c: bodies and the joints that carry them. */
 #include "io/osim.h"
 
+#include <stdio.h>
 #include <string.h>
 
 static void read_inertia(mhi_osim *o, xmlNode *node, double inertia[9]) {
@@ -191,16 +192,36 @@ static mhi_body_draft *body_named(mhi_osim *o, const char *name) {
     return NULL;
 }
 
+/* One end of a joint; between 3.3 and 4.0 its place in the body stands in the joint itself. */
+static int32_t read_end(mhi_osim *o, xmlNode *node, const char *owner, const char *which,
+                        const char **body, mhi_transform *in_body) {
+    char name[64];
+    double angles[3] = {0};
+    mhi_transform offset = mhi_transform_identity(), place;
+    (void)snprintf(name, sizeof name, "%s_frame", which);
+    const char *socket = mhi_osim_socket(o, node, name);
+    if (socket == NULL) {
+        (void)snprintf(name, sizeof name, "%s_body", which);
+        socket = mhi_osim_socket(o, node, name);
+        (void)snprintf(name, sizeof name, "location_in_%s", which);
+        (void)mhi_xml_numbers(o, node, name, offset.p, 3);
+        (void)snprintf(name, sizeof name, "orientation_in_%s", which);
+        (void)mhi_xml_numbers(o, node, name, angles, 3);
+        mhi_rotation_sequence("xyz", angles, offset.r);
+    }
+    if (!mhi_osim_resolve(o, socket, owner, mhi_xml_line(node), body, &place)) {
+        return 0;
+    }
+    *in_body = mhi_transform_times(&place, &offset);
+    return 1;
+}
+
 static int32_t read_ends(mhi_osim *o, xmlNode *node, ends *e) {
     const char *name = mhi_xml_name(o, node);
     const char *owner = mhi_arena_format(&o->b.arena, "/jointset/%s", name);
-    int32_t line = mhi_xml_line(node);
     *e = (ends){.joint = {.node = node, .name = name}};
-    return owner != NULL &&
-           mhi_osim_resolve(o, mhi_osim_socket(o, node, "parent_frame"), owner, line, &e->parent,
-                            &e->in_parent) &&
-           mhi_osim_resolve(o, mhi_osim_socket(o, node, "child_frame"), owner, line, &e->child,
-                            &e->in_child);
+    return owner != NULL && read_end(o, node, owner, "parent", &e->parent, &e->in_parent) &&
+           read_end(o, node, owner, "child", &e->child, &e->in_child);
 }
 
 /* Joints whose child is carried already run the other way: their child carries their parent. What

@@ -135,13 +135,46 @@ static void read_degroote(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
     }
 }
 
-/* A curve that stands in the file as a function. */
+/* The SIMM splines that OpenSim takes where a file is silent (Schutte1993Muscle_Deprecated,
+ * RigidTendonMuscle). */
+static const struct default_curve {
+    const char *tag;
+    int32_t n;
+    double x[21], y[21];
+} default_curves[] = {{"active_force_length_curve",
+                       21,
+                       {-5.307692, -4.307692, -1.923077, -0.884615, -0.269231, 0.230769, 0.461538,
+                        0.52725,   0.62875,   0.71875,   0.86125,   1.045,     1.2175,   1.43875,
+                        1.5,       1.615385,  2,         2.961538,  3.692308,  5.461538, 9.901902},
+                       {0.012188, 0.021899, 0.036466, 0.052493, 0.075312, 0.114158, 0.157859,
+                        0.226667, 0.636667, 0.856667, 0.95,     0.993333, 0.77,     0.246667,
+                        0.193821, 0.133252, 0.072683, 0.044417, 0.036341, 0.021899, 0.007332}},
+                      {"passive_force_length_curve",
+                       13,
+                       {-5, 0.998, 0.999, 1, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.601, 1.602, 5},
+                       {0, 0, 0, 0, 0.035, 0.12, 0.26, 0.55, 1.17, 2, 2, 2, 2}},
+                      {"tendon_force_length_curve",
+                       17,
+                       {-10, -0.002, -0.001, 0, 0.00131, 0.00281, 0.00431, 0.00581, 0.00731,
+                        0.00881, 0.0103, 0.0118, 0.0123, 9.2, 9.201, 9.202, 20},
+                       {0, 0, 0, 0, 0.0108, 0.0257, 0.0435, 0.0652, 0.0915, 0.123, 0.161, 0.208,
+                        0.227, 345, 345, 345, 345}}};
+
+/* A curve that stands in the file as a function, or OpenSim's own. */
 static void read_file_curve(mhi_osim *o, xmlNode *node, const char *tag, mhe_function *out,
                             const char *whose) {
-    if (mhi_osim_function_of(o, node, tag, whose, out) == 0) {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node), "muscle '%s' states no %s: it has none",
-                              whose, tag);
+    if (mhi_osim_function_of(o, node, tag, whose, out) != 0) {
+        return;
     }
+    for (size_t i = 0; i < sizeof default_curves / sizeof *default_curves; i++) {
+        const struct default_curve *c = &default_curves[i];
+        if (strcmp(c->tag, tag) == 0) {
+            *out = mhi_function_spline(&o->b, c->x, c->y, c->n);
+            return;
+        }
+    }
+    mhi_build_unsupported(&o->b, mhi_xml_line(node), "muscle '%s' states no %s: it has none", whose,
+                          tag);
 }
 
 static void read_file_curves(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
