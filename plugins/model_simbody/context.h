@@ -55,6 +55,10 @@ typedef struct simbody_context {
     double *length_q;                              /* [n_muscles x n_q] */
 } simbody_context;
 
+/* inside.c: warns of paths whose points lie inside their obstacles at the default position. Of a
+ * model that is built, with a host. */
+mhe_status simbody_tell_inside(simbody_model *model, mhe_error *err);
+
 /* bodies.c: poses of the bodies and their derivatives, as mhe_kinematics has them; either may be
  * NULL. Of a context that is placed. */
 void bodies_place(const simbody_context *c, double *body, double *body_q);

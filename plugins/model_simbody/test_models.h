@@ -20,6 +20,8 @@ void test_open(test_instance *out, const mhe_description *description, int32_t d
 void test_open_fitted(test_instance *out, const mhe_description *description, double tolerance,
                       double range);
 void test_close(test_instance *instance);
+/* The last line that an instance told its host. */
+extern char test_told[512];
 const mhe_model_ops *test_model_ops(void);
 
 /* Two bars about z in a vertical plane: closed form in test_dynamics.c. */

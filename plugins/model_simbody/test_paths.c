@@ -455,6 +455,19 @@ static void fits_are_kept(void **state) {
     test_close(&third);
 }
 
+static void a_point_inside_an_obstacle_is_told(void **state) {
+    (void)state;
+    mhe_description d = leg;
+    mhe_obstacle larger[5];
+    test_instance other;
+    memcpy(larger, obstacles, sizeof larger);
+    larger[0].size[0] = 0.5;
+    d.obstacles = larger;
+    test_open(&other, &d, 0);
+    assert_non_null(strstr(test_told, "path 'sphere' (line 3) has a point inside 'ball'"));
+    test_close(&other);
+}
+
 static void refused(const mhe_description *d, const char *part) {
     void *self = NULL;
     mhe_error err = {0};
@@ -510,6 +523,7 @@ int main(void) {
         cmocka_unit_test(couplers_are_carried_by_both_dynamics),
         cmocka_unit_test(fitted_paths_keep_their_tolerance),
         cmocka_unit_test(fits_are_kept),
+        cmocka_unit_test(a_point_inside_an_obstacle_is_told),
         cmocka_unit_test(senseless_paths_are_refused),
     };
     return cmocka_run_group_tests(tests, setup, teardown);

@@ -17,8 +17,8 @@
 #define STEP 0.7    /* longest step, as an angle by the curvature where it begins */
 #define MAX_HALVINGS 12
 #define MAX_STEPS 60
-#define MAX_NEWTON 20
-#define MAX_CUTS 6
+#define MAX_NEWTON 12
+#define MAX_CUTS 4
 #define NEAR 1e-3    /* miss, relative to the surface's size: from here on, fine steps */
 #define LONGEST 7.0  /* sizes: no string is longer on its surface */
 #define MAX_TURN 0.5 /* rad, sizes: longest step of Newton's method */
