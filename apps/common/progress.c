@@ -5,6 +5,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #define BAR 30
@@ -23,6 +24,12 @@ double progress_elapsed(const progress *p) {
 int32_t progress_due(const progress *p, int32_t done) {
     return p->enabled && done > p->before &&
            (measure_seconds() - p->drawn >= 0.1 || done == p->total);
+}
+
+/* A longer line would wrap and stay on the screen. */
+static int terminal_width(void) {
+    struct winsize size;
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 ? size.ws_col : 80;
 }
 
 /* "45 s", "12 min", "3 h 05 min" */
@@ -54,8 +61,10 @@ void progress_update(progress *p, int32_t done, const char *format, ...) {
     va_start(args, format);
     (void)vsnprintf(words, sizeof words, format, args);
     va_end(args);
-    (void)fprintf(stderr, "\r\033[K[%s] %3d %%  %s left  %s ", bar, (int)(100.0 * done / p->total),
-                  left, words);
+    char line[BAR + 256];
+    (void)snprintf(line, sizeof line, "[%s] %3d %%  %s left  %s", bar,
+                   (int)(100.0 * done / p->total), left, words);
+    (void)fprintf(stderr, "\r\033[K%.*s", terminal_width() - 1, line);
     (void)fflush(stderr);
 }
 

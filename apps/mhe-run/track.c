@@ -7,6 +7,7 @@
 #include "report.h"
 #include "results.h"
 #include "summary.h"
+#include "understood.h"
 
 #include <mhe/library.h>
 #include <string.h>
@@ -261,7 +262,7 @@ static void tell(const tracking *t) {
     mhe_free(findings);
     if (!text.failed) {
         (void)fputs(text.data, stdout);
-        (void)printf("results in %s\n", t->setup->out);
+        (void)printf("results in %s; open %s/report.html\n", t->setup->out, t->setup->out);
         if (report_write(t->setup->out, mhe_config_name(t->setup->config), text.data, &why) !=
             MHE_OK) {
             t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
@@ -308,6 +309,21 @@ static mhe_status finish(tracking *t, mhe_error *err) {
     return MHE_OK;
 }
 
+/* --check: what was understood, and whether it can be believed. */
+static mhe_status tell_understood(tracking *t, mhe_error *err) {
+    mhi_text text = {0};
+    t->summary.findings = t->findings;
+    t->summary.config = t->setup->config;
+    mhe_status status = mhe_findings_judge(t->findings, &t->summary.weight, err);
+    if (status == MHE_OK) {
+        understood_lines(&t->summary.info, &t->summary.recording, t->recording, &text);
+        summary_verdict(&t->summary, &text);
+        (void)fputs(text.failed ? "" : text.data, stdout);
+    }
+    mhi_text_free(&text);
+    return status;
+}
+
 mhe_status track(const track_setup *setup, mhe_error *err) {
     tracking t = {.setup = setup};
     mhe_status status = open_all(&t, err);
@@ -319,6 +335,9 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
             status = finish(&t, err);
         }
         interrupt_end();
+    }
+    if (status == MHE_OK && setup->check_only) {
+        status = tell_understood(&t, err);
     }
     if (t.outbox != NULL) {
         tell_stale(&t);

@@ -44,5 +44,9 @@ mhe_status mhi_believe_fit(const mhi_run *run, const mhi_system *system,
 mhe_status mhi_believe_model(const mhi_run *run, const mhi_system *system,
                              const mhi_recording *recording, mhi_findings *findings,
                              mhe_error *err);
+/* believe_reference.c: are the reference's forces those of this model's muscles? It says nothing of
+ * the estimate. [cold] */
+void mhi_believe_reference(const mhi_run *run, const mhi_system *system,
+                           const mhi_recording *recording, mhi_findings *findings);
 
 #endif

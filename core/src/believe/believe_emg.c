@@ -33,7 +33,7 @@ static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
             run = 0;
             continue;
         }
-        run = value == last ? run + 1 : 0;
+        run = value == last && value != 0 ? run + 1 : 0; /* 0 is a muscle at rest */
         c.n_flat += run > FLAT * r->rate;
         last = value;
         c.low = fmin(c.low, value);

@@ -17,7 +17,9 @@
 #define SLIGHT_TURN 1.5 /* degrees */
 #define SLIGHT_SHIFT 0.004 /* m */
 #define SLIGHT_SCALE 0.02
-#define LYING 55.0 /* degrees from upright throughout */
+#define LARGE_TURN 15.0 /* degrees: as many are the joints off */
+#define LARGE_SHIFT 0.1 /* m */
+#define LYING 55.0      /* degrees from upright throughout */
 
 typedef struct trial {
     mhi_pose pose;
@@ -156,10 +158,13 @@ static void try_axes(mhi_pose_search *s, trial *best) {
 
 static void tell_transform(const char *path, const trial *best, double as_is,
                            mhi_findings *findings) {
-    const int32_t weight = as_is > HOPELESS ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL;
     const double *t = best->pose.shift;
     double axis[3];
     const double degrees = axis_of(&best->pose, axis);
+    const double shift = sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+    const int far = as_is > HOPELESS || determinant(best->pose.turn) < 0 || degrees > LARGE_TURN ||
+                    shift > LARGE_SHIFT;
+    const int32_t weight = far ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL;
     mhi_text how = {0};
     write_transform(&best->pose, &how);
     if (determinant(best->pose.turn) < 0) {

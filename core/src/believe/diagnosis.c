@@ -15,6 +15,7 @@
 #define AT_BOUND 0.999   /* share of the largest activation */
 #define OFTEN 0.1        /* share of estimates */
 #define LARGE_TORQUE 0.5 /* residual torque over the muscles' moment, RMS */
+#define LARGE_SIZE 20.0  /* N m: worth a word whatever the muscles do */
 #define DISAGREES 0.15   /* RMS difference of EMG and estimate */
 
 mhe_status mhi_diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
@@ -292,7 +293,7 @@ static void torque_lines(const mhi_diagnosis *d, mhi_text *out) {
     int32_t n = 0;
     for (int32_t i = 0; i < f->n_q; i++) {
         const double torque = mhi_tally_rms(&d->torques[i]), moment = mhi_tally_rms(&d->moments[i]);
-        if (torque > 1 && torque > LARGE_TORQUE * moment) {
+        if (torque > 1 && (torque > LARGE_TORQUE * moment || torque > LARGE_SIZE)) {
             mhi_text_add(out, "%s %s %.1f N m (muscles %.1f)",
                          n++ == 0 ? "large residual torques (RMS):" : ",", f->coordinate_names[i],
                          torque, moment);

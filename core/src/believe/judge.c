@@ -7,17 +7,17 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MOST_CONVERGED 0.9 /* of the windows; below it estimates are whatever the solver had */
-#define FEW_CONVERGED 0.5
+#define MOST_CONVERGED 0.75 /* of the windows; below it estimates are whatever the solver had */
 #define FEW_PREDICTED 0.02
 #define MANY_PREDICTED 0.2
-#define MARKERS_FAR 0.03 /* m RMS over all markers */
+#define MARKERS_FAR \
+    0.008 /* m RMS over all markers: angles may be 2 degrees off (docs/believability.md) */
 #define MARKERS_LOST 0.06
 #define MARKER_FAR 0.025 /* m RMS of a single one, and ... */
 #define STANDS_OUT 3.0   /* ... times the median marker's */
 #define DOUBTED 0.2      /* of a marker's or channel's samples not believed */
-#define EMG_FAR 0.1      /* RMS over all muscles, of 1 */
-#define MUSCLE_FAR 0.2   /* RMS of a single one, of 1 */
+#define EMG_FAR 0.025    /* RMS over all muscles, of 1: forces may be 10 N off */
+#define MUSCLE_FAR 0.15  /* RMS of a single one, of 1 */
 #define AT_BOUND_OFTEN 0.1
 #define AT_END_OFTEN 0.1
 #define TORQUE_LARGE 1.0 /* times the muscles' moment, RMS */
@@ -47,7 +47,7 @@ static void judge_solves(const mhi_diagnosis *d, mhi_findings *findings) {
     }
     if (converged + predicted < MOST_CONVERGED) {
         mhi_findings_add(
-            findings, converged < FEW_CONVERGED ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL,
+            findings, MHI_FINDING_DOUBTFUL,
             "allow more iterations (the solver's max_iterations), a longer deadline, or "
             "find what of the data does not fit",
             "%.3g %% of the windows converged", 100 * converged);
@@ -74,7 +74,7 @@ static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
     if (all > MARKERS_FAR) {
         mhi_findings_add(findings, all > MARKERS_LOST ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL,
                          "is the model scaled to this person, do labels and markers' places agree?",
-                         "the markers are %.0f mm from the estimate (RMS)", 1e3 * all);
+                         "the markers are %.1f mm from the estimate (RMS)", 1e3 * all);
     }
     for (int32_t i = 0; i < f->n_markers; i++) {
         const double rms = mhi_tally_rms(&d->markers[i]);
@@ -119,7 +119,7 @@ static void judge_emg(const mhi_diagnosis *d, mhi_findings *findings) {
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
                          "check the MVC values, and that EMG and markers have one clock "
                          "(data.emg_offset)",
-                         "EMG and estimate are %.2f apart (RMS, of 1)", sqrt(squares / n));
+                         "EMG and estimate are %.3f apart (RMS, of 1)", sqrt(squares / n));
     }
     if (n > 0 && doubted > DOUBTED * n) {
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL, "data.emg_saturation says when",

@@ -26,6 +26,9 @@ static mhe_status believe(const mhe_config *config, const mhi_system *system, mh
     if (status == MHE_OK) {
         status = mhi_believe_fit(config->run, system, data, &data->findings, err);
     }
+    if (status == MHE_OK) {
+        mhi_believe_reference(config->run, system, data, &data->findings);
+    }
     mhi_findings_tell(&data->findings, told, config->host);
     return status;
 }

@@ -1,0 +1,230 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What each check of the room says of data that are wrong in one way, and of sound ones: nothing.
+ * The markers' frame and the estimate's verdict are asked by tests/cases and corruptions.sh. */
+#include "believe/believe.h"
+#include "support.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define FRAMES 200
+#define MUSCLES 4
+#define MARKERS 2
+
+static const mhe_coordinate coordinates[] = {
+    {.name = "flex", .rotational = 1, .lower = -0.2, .upper = 2.6},
+    {.name = "slide", .rotational = 0, .lower = -1, .upper = 1}};
+static const mhe_muscle muscles[] = {{.name = "A"}, {.name = "B"}, {.name = "C"}, {.name = "D"}};
+static const mhe_marker markers[] = {{.name = "K"}, {.name = "L"}};
+
+static const mhe_description model = {.size = sizeof model,
+                                      .n_coordinates = 2,
+                                      .coordinates = coordinates,
+                                      .n_muscles = MUSCLES,
+                                      .muscles = muscles,
+                                      .n_markers = MARKERS,
+                                      .markers = markers};
+
+/* Two seconds of sound data. */
+typedef struct rig {
+    double time[FRAMES], emg[FRAMES * MUSCLES], angles[FRAMES * 2], markers[FRAMES * 3 * MARKERS];
+    mhi_recording recording;
+    mhi_run run;
+    mhi_findings findings;
+    mhe_error err;
+} rig;
+
+static rig *new_rig(void) {
+    rig *r = calloc(1, sizeof *r);
+    assert_non_null(r);
+    for (int k = 0; k < FRAMES; k++) {
+        const double t = r->time[k] = k / 100.0;
+        for (int i = 0; i < MUSCLES; i++) {
+            r->emg[k * MUSCLES + i] = fmax(0, 0.1 * (i + 1) * sin(5 * t + i)); /* 0: at rest */
+        }
+        r->angles[2 * k] = 0.5 + 0.3 * sin(3 * t);
+        r->angles[2 * k + 1] = 0.1 * t;
+        for (int i = 0; i < 3 * MARKERS; i++) {
+            r->markers[k * 3 * MARKERS + i] = 0.1 * i + 0.05 * sin(3 * t + i);
+        }
+    }
+    r->recording = (mhi_recording){.n_frames = FRAMES,
+                                   .rate = 100,
+                                   .time = r->time,
+                                   .emg = r->emg,
+                                   .angles = r->angles,
+                                   .markers = r->markers,
+                                   .n_q = 2};
+    r->run.path = "run.yaml";
+    r->run.data.emg = "emg.sto";
+    r->run.data.markers = "m.trc";
+    return r;
+}
+
+static void free_rig(rig *r) {
+    mhi_findings_free(&r->findings);
+    free(r);
+}
+
+/* One finding of this weight with these words. */
+static void expect(const rig *r, int32_t weight, const char *text) {
+    for (int32_t i = 0; i < r->findings.n; i++) {
+        const mhi_finding *f = &r->findings.all[i];
+        if (f->weight == weight && strstr(f->text, text) != NULL) {
+            assert_true(strlen(mhi_finding_remedy(f)) > 0);
+            return;
+        }
+    }
+    fail_msg("'%s' is not among %d findings (first: %s)", text, (int)r->findings.n,
+             r->findings.n > 0 ? r->findings.all[0].text : "none");
+}
+
+static mhe_status check_emg(rig *r) {
+    return mhi_believe_emg(&r->run, &model, &r->recording, &r->findings, &r->err);
+}
+
+static mhe_status check_angles(rig *r, int32_t in_degrees) {
+    const mhi_angles_source source = {"a.mot", 7, in_degrees};
+    return mhi_believe_angles(&model, &r->recording, &source, &r->findings, &r->err);
+}
+
+static void sound_data_give_no_finding(void **state) {
+    (void)state;
+    rig *r = new_rig();
+    assert_int_equal(check_emg(r), MHE_OK);
+    assert_int_equal(check_angles(r, 0), MHE_OK);
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    assert_int_equal(r->findings.n, 0);
+    assert_string_equal(mhi_usable(mhi_findings_weight(&r->findings)), "yes");
+    free_rig(r);
+}
+
+static void emg_that_is_none_is_refused(void **state) {
+    (void)state;
+    static const struct {
+        double factor, offset;
+        const char *text;
+    } cases[] = {{100, 0, "percent?"}, {4000, 0, "raw EMG?"}, {1, -0.2, "is this raw EMG?"}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+        rig *r = new_rig();
+        for (int k = 0; k < FRAMES * MUSCLES; k++) {
+            r->emg[k] = cases[i].factor * r->emg[k] + cases[i].offset;
+        }
+        assert_int_equal(check_emg(r), MHE_E_INPUT);
+        assert_non_null(strstr(r->err.text, "emg.sto: values from"));
+        assert_non_null(strstr(r->err.text, cases[i].text));
+        free_rig(r);
+    }
+}
+
+static void doubtful_emg_is_named(void **state) {
+    (void)state;
+    rig *r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->emg[k * MUSCLES] = 0;                                            /* dead */
+        r->emg[k * MUSCLES + 1] = k < 100 ? r->emg[k * MUSCLES + 1] : 0.17; /* held */
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "nothing but zeros: A");
+    expect(r, MHI_FINDING_DOUBTFUL, "more than 0.3 s: B");
+    assert_int_equal(r->findings.n, 2);
+    free_rig(r);
+    r = new_rig();
+    for (int i = 0; i < MUSCLES; i++) {
+        double most = 0;
+        for (int k = 0; k < FRAMES; k++) {
+            most = fmax(most, r->emg[k * MUSCLES + i]);
+        }
+        for (int k = 0; k < FRAMES; k++) {
+            r->emg[k * MUSCLES + i] /= most;
+        }
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "the maximum is exactly 1 in 4 of 4 channels");
+    free_rig(r);
+    r = new_rig();
+    for (int k = 80 * MUSCLES; k < FRAMES * MUSCLES; k++) {
+        r->emg[k] = NAN;
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "EMG from 0 to 0.79 s, frames from 0 to 1.99 s: 40 %");
+    free_rig(r);
+}
+
+static void a_cost_without_its_emg_is_told(void **state) {
+    (void)state;
+    static const mhe_plugin cost = {.id = "mhe.cost.emg-markers-high"};
+    mhi_use use = {.plugin = &cost, .weight = 1};
+    rig *r = new_rig();
+    r->recording.emg = NULL;
+    r->run.costs = &use;
+    r->run.n_costs = 1;
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "a cost tracks EMG, but data.emg is not given");
+    free_rig(r);
+}
+
+static void angles_against_their_ranges(void **state) {
+    (void)state;
+    rig *r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->angles[2 * k] *= 57.29577951308232;
+    }
+    assert_int_equal(check_angles(r, 0), MHE_E_INPUT);
+    assert_non_null(strstr(r->err.text, "a.mot:7: 'flex' goes from 11.4"));
+    assert_non_null(strstr(r->err.text, "'inDegrees=yes'"));
+    free_rig(r);
+    r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->angles[2 * k] /= 57.29577951308232; /* radians that the header calls degrees */
+    }
+    assert_int_equal(check_angles(r, 1), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "no angle is larger than 0.8 degrees");
+    free_rig(r);
+    r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->angles[2 * k] *= -1; /* the wrong sign */
+    }
+    assert_int_equal(check_angles(r, 0), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "'flex' goes from -0.8 to -0.2");
+    free_rig(r);
+}
+
+static void markers_that_hold_or_are_gone(void **state) {
+    (void)state;
+    const int width = 3 * MARKERS;
+    rig *r = new_rig();
+    for (int k = 100; k < 150; k++) {
+        memcpy(&r->markers[k * width], &r->markers[99 * width], 3 * sizeof(double));
+    }
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    expect(r, MHI_FINDING_DOUBTFUL, "repeat to the last digit: K (25 %");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+    r = new_rig();
+    for (int k = 0; k < FRAMES * width; k++) {
+        r->markers[k] = k < 60 * width ? NAN : r->markers[k];
+    }
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    expect(r, MHI_FINDING_DOUBTFUL, "30 % of the frames have no marker");
+    for (int k = 0; k < FRAMES * width; k++) {
+        r->markers[k] = NAN;
+    }
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    expect(r, MHI_FINDING_USELESS, "no marker of the model is there in any frame");
+    assert_string_equal(mhi_usable(mhi_findings_weight(&r->findings)), "no");
+    free_rig(r);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sound_data_give_no_finding),
+        cmocka_unit_test(emg_that_is_none_is_refused),
+        cmocka_unit_test(doubtful_emg_is_named),
+        cmocka_unit_test(a_cost_without_its_emg_is_told),
+        cmocka_unit_test(angles_against_their_ranges),
+        cmocka_unit_test(markers_that_hold_or_are_gone),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
