@@ -143,6 +143,7 @@ int layers_has(const layers *l, int32_t layer) {
 
 mhe_status layers_time(layers *l, int32_t layer, int32_t calls, double *seconds, mhe_error *err) {
     mhe_status status = MHE_OK;
+    mhi_work_begin(mhi_ocp_work(mhi_estimator_ocp(l->rig->estimator)), 0, 0); /* no frame's bound */
     const double begin = measure_seconds();
     double again = 0;
     for (int32_t i = 0; i < calls && status == MHE_OK; i++) {
