@@ -108,7 +108,7 @@ defaults() {
     if "$prefix/bin/mhe-run" --check "$source/models/arm19/demo.yaml" --set solver= >"$work/check.txt" 2>&1; then
         give_up "a wrong line in defaults.yaml is accepted"
     fi
-    expect "defaults.yaml:8: defaults are lines like" "$work/check.txt"
+    expect "defaults.yaml:11: defaults are lines like" "$work/check.txt"
     rm "$file"
     if "$prefix/bin/mhe-run" --check "$source/models/arm19/demo.yaml" --set solver= >"$work/check.txt" 2>&1; then
         give_up "no plugin is named anywhere, yet one is used"
