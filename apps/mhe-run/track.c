@@ -158,11 +158,6 @@ static mhe_status estimate_frame(tracking *t, int32_t k, mhe_error *err) {
     mhe_estimate estimate = {.size = sizeof estimate};
     int32_t ready = 0;
     mhe_status status = mhe_recording_frame(t->recording, k, &frame, err);
-    if (status == MHE_OK && !t->setup->realtime) {
-        /* By the clock it was done while waiting. The result is the same, the time counts as solve
-         * time. */
-        status = mhe_estimator_prepare(t->estimator, err);
-    }
     if (status == MHE_OK) {
         status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
     }

@@ -70,10 +70,6 @@ static mhe_status estimate_all(tracking *t, mhe_error *err) {
         const mhe_frame frame = mhi_recording_frame(r, t->info.n_markers, t->info.n_muscles, k);
         mhe_estimate estimate = {.size = sizeof estimate};
         int32_t ready = 0;
-        status = mhe_estimator_prepare(t->estimator, err);
-        if (status != MHE_OK) {
-            break;
-        }
         status = mhe_estimator_push(t->estimator, &frame, &estimate, &ready, err);
         if (status == MHE_OK && ready) {
             status = tally_add(counts, &estimate, err);

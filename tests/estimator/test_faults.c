@@ -97,7 +97,6 @@ static void run(rig *r, fault harm, outcome *o) {
             .size = sizeof frame, .time = told[k], .markers = markers, .emg = emg};
         mhe_estimate e = {.size = sizeof e};
         int32_t ready = 0;
-        assert_int_equal(mhe_estimator_prepare(r->f.estimator, &r->f.err), MHE_OK);
         assert_int_equal(mhe_estimator_push(r->f.estimator, &frame, &e, &ready, &r->f.err), MHE_OK);
         int32_t at = k; /* the newest frame that was told this time */
         while (ready && at >= 0 && !(fabs(told[at] - e.time) < 1e-3)) {

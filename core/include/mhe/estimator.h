@@ -26,8 +26,8 @@
  * three frames in a row do not fit what was expected, or a whole window of solves failed, the
  * window begins again from its measurements (MHE_FRAME_RESTARTED). With `realtime.deadline_ms`
  * every solve ends in time with what it has; the long first solve of a window that begins is then
- * spread over the frames that follow. Without it a frame may take some ten times what frames
- * usually take, counted, not by the clock; the first window has a limit of its own.
+ * spread over the frames that follow. Without it a frame may take ten times what frames usually
+ * take, counted, not by the clock; the first window has a limit of its own.
  *
  * A config file may come from anywhere, and a plugin is code: a `plugin_path` in the file is
  * refused. An application that trusts a folder names it itself, by `set` or in MHE_PLUGIN_PATH.

@@ -7,10 +7,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Times the usual work of a frame, preparation included. Where a window begins again more of it are
- * interior-point steps, which take less time for their work than dynamics far out do. */
-#define SOLVE 8.0
-#define SOLVE_SETTLING 11.0
+/* Times the usual work of a frame, preparation included. A frame that was not prepared linearises
+ * itself, which takes less time for its work than the steps that follow do. */
+#define SOLVE 11.0
+#define SOLVE_PREPARED 8.0
 /* Ahead of a frame there is time, but with a deadline the next one must not wait. */
 #define PREPARE 20.0
 #define PREPARE_BY_CLOCK 8.0
@@ -48,8 +48,8 @@ static void begin_work(mhe_estimator *e, double most) {
 
 void mhi_pace_begin(mhe_estimator *e) {
     mhi_pace *p = &e->pace;
+    const double times = p->prepared > 0 ? SOLVE_PREPARED : SOLVE;
     p->settled = mhi_phase_settled(e);
-    const double times = p->settled ? SOLVE : SOLVE_SETTLING;
     if (by_clock(e)) {
         mhi_work_begin(mhi_ocp_work(e->ocp), 0, p->arrival + GRACE * p->budget);
     } else {
