@@ -93,6 +93,7 @@ static int confirms(contender *c, const contender *other) {
 }
 
 static void compare(contender *rti, contender *ipopt, const mhe_estimator *e, tally *t) {
+    mhi_work_begin(mhi_ocp_work(e->ocp), 0, 0); /* no frame's bound holds here */
     const int by_rti = contender_solve(rti, e->window.guess_x, e->window.guess_u);
     const int by_ipopt = contender_solve(ipopt, e->window.guess_x, e->window.guess_u);
     const double x = difference(rti->at.x, ipopt->at.x, rti->n_x);
