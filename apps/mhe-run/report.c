@@ -43,78 +43,99 @@ static void widen(const rows *t, int32_t column, double scale, double range[2]) 
     }
 }
 
-/* A line through the rows of a column; missing values break it. */
+/* A line through the rows of a column within the time of `frame`; missing values break it. */
 static void add_line(mhi_text *out, const rows *t, int32_t column, double scale,
-                     const double range[2], const char *style) {
+                     const double range[2], const rows *frame, const char *style) {
     const int32_t step = t->is.n_rows / POINTS + 1;
-    const double span = t->is.time[t->is.n_rows - 1] - t->is.time[0];
+    const double begin = frame->is.time[0];
+    const double span = frame->is.time[frame->is.n_rows - 1] - begin;
     int open = 0;
     mhi_text_add(out, "<path class=\"%s\" d=\"", style);
     for (int32_t k = 0; k < t->is.n_rows; k += step) {
         const double y = value_at(t, k, column, scale);
-        if (isnan(y)) {
+        if (isnan(y) || t->is.time[k] < begin || t->is.time[k] > begin + span) {
             open = 0;
             continue;
         }
         mhi_text_add(out, "%c%.1f %.1f", open ? 'L' : 'M',
-                     span > 0 ? WIDTH * (t->is.time[k] - t->is.time[0]) / span : 0,
+                     span > 0 ? WIDTH * (t->is.time[k] - begin) / span : 0,
                      HEIGHT * (range[1] - y) / (range[1] - range[0]));
         open = 1;
     }
     mhi_text_add(out, "\"/>");
 }
 
-/* One small picture: a column, and beside it one of a second table (column -1: none). */
-static void add_panel(mhi_text *out, const char *name, const rows *t, int32_t column,
-                      const rows *other, int32_t other_column, double scale, double least) {
+/* A row of pictures: what is drawn, against what; least: the axis spans at least that much. */
+typedef struct quantity {
+    const char *heading, *prefix, *unit;
+    const rows *table, *measured, *truth; /* of the last two NULL: none */
+    const char *truth_prefix;
+    double scale, least;
+} quantity;
+
+/* One small picture: a column, what was measured of it and what is true, where these are known. */
+static void add_panel(mhi_text *out, const quantity *q, const char *name, int32_t column) {
+    const rows *t = q->table, *other = q->measured;
+    const int32_t other_column = other == NULL ? -1 : mhe_table_find(other->table, name);
+    const double scale = q->scale;
+    char label[256];
+    (void)snprintf(label, sizeof label, "%s%s", q->truth_prefix, name);
+    const int32_t truth = q->truth == NULL ? -1 : mhe_table_find(q->truth->table, label);
     double range[2] = {INFINITY, -INFINITY};
     widen(t, column, scale, range);
     widen(other, other_column, scale, range);
+    widen(q->truth, truth, scale, range);
     if (!(range[0] <= range[1])) {
         return;
-    }
-    if (range[1] - range[0] < least) {
-        const double middle = 0.5 * (range[0] + range[1]);
-        range[0] = middle - 0.5 * least;
-        range[1] = middle + 0.5 * least;
     }
     mhi_text_add(out, "<figure><figcaption>");
     add_escaped(out, name);
     mhi_text_add(out,
-                 " <small>%.4g to %.4g</small></figcaption><svg viewBox=\"0 -2 %g %g\" "
+                 " <small>%.3g to %.3g %s</small></figcaption><svg viewBox=\"0 -2 %g %g\" "
                  "role=\"img\">",
-                 range[0], range[1], WIDTH, HEIGHT + 4);
-    if (other != NULL && other_column >= 0) {
-        add_line(out, other, other_column, scale, range, "measured");
+                 range[0], range[1], q->unit, WIDTH, HEIGHT + 4);
+    if (range[1] - range[0] < q->least) { /* the axis alone: small changes stay small */
+        const double middle = 0.5 * (range[0] + range[1]);
+        const int grounded = range[0] >= 0 && middle < 0.5 * q->least;
+        range[0] = grounded ? 0 : middle - 0.5 * q->least;
+        range[1] = range[0] + q->least;
     }
-    add_line(out, t, column, scale, range, "estimated");
+    if (truth >= 0) {
+        add_line(out, q->truth, truth, scale, range, t, "true");
+    }
+    if (other != NULL && other_column >= 0) {
+        add_line(out, other, other_column, scale, range, t, "measured");
+    }
+    add_line(out, t, column, scale, range, t, "estimated");
     mhi_text_add(out, "</svg></figure>\n");
 }
 
-static void add_all(mhi_text *out, const char *heading, const rows *t, const char *prefix,
-                    const rows *other, double scale, double least) {
-    const size_t length = strlen(prefix);
+static void add_all(mhi_text *out, const quantity *q) {
+    const rows *t = q->table;
+    const size_t length = strlen(q->prefix);
     if (t == NULL) {
         return;
     }
-    mhi_text_add(out, "<h2>%s</h2>\n<div>\n", heading);
+    mhi_text_add(out, "<h2>%s</h2>\n<div>\n", q->heading);
     for (int32_t i = 0; i < t->is.n_labels; i++) {
-        if (strncmp(t->is.labels[i], prefix, length) == 0) {
-            const char *name = t->is.labels[i] + length;
-            add_panel(out, name, t, i, other,
-                      other == NULL ? -1 : mhe_table_find(other->table, name), scale, least);
+        if (strncmp(t->is.labels[i], q->prefix, length) == 0) {
+            add_panel(out, q, t->is.labels[i] + length, i);
         }
     }
     mhi_text_add(out, "</div>\n");
 }
 
 static const char head[] =
-    "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\"><style>\n"
+    "<!DOCTYPE html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
+    "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\"><style>\n"
     "body{font:15px/1.4 sans-serif;max-width:1000px;margin:2em auto;padding:0 1em}\n"
     "div{display:grid;grid-template-columns:repeat(auto-fill,minmax(230px,1fr));gap:10px}\n"
     "figure{margin:0}figcaption{overflow-wrap:anywhere}small{color:#666}\n"
     "svg{width:100%;background:#f6f6f6}path{fill:none;stroke-width:1.5}\n"
-    ".estimated{stroke:#1f5fa8}.measured{stroke:#d9822b}pre{white-space:pre-wrap}\n"
+    ".estimated{stroke:#1f5fa8}.measured{stroke:#d9822b}.true{stroke:#999;stroke-width:3}\n"
+    "pre{white-space:pre-wrap;overflow-wrap:anywhere}\n"
+    "@media(max-width:600px){body{margin:1em auto}\n"
+    "div{grid-template-columns:repeat(auto-fill,minmax(150px,1fr))}h1{font-size:1.4em}}\n"
     "</style>\n";
 
 /* NULL where it could not be read. */
@@ -130,26 +151,37 @@ static void compose(mhi_text *out, const char *name, const char *summary, const 
     mhi_text_add(out, "</h1>\n<pre>");
     add_escaped(out, summary);
     mhi_text_add(out,
-                 "</pre>\n<p>Blue: estimated. Orange: measured. Time from %.4g to %.4g s.</p>\n",
-                 tables[0].is.time[0], tables[0].is.time[tables[0].is.n_rows - 1]);
-    add_all(out, "Joint coordinates (degrees; of sliders 1/57.3 m)", shown(&tables[0]), "q_", NULL,
-            MHI_DEGREES, 1);
-    add_all(out, "Activation against EMG", shown(&tables[0]), "a_", shown(&tables[3]), 1, 0.1);
-    add_all(out, "Muscle forces (N)", shown(&tables[1]), "", NULL, 1, 10);
-    add_all(out, "Distance of markers (mm)", shown(&tables[2]), "", NULL, 1e3, 1);
-    add_all(out, "Solve time (ms)", shown(&tables[4]), "solve_", NULL, 1, 1);
+                 "</pre>\n<p>Blue: estimated. Orange: measured.%s Time from %.4g to %.4g s. Least "
+                 "and largest value stand above each picture.</p>\n",
+                 tables[5].table != NULL ? " Grey: the known truth." : "", tables[0].is.time[0],
+                 tables[0].is.time[tables[0].is.n_rows - 1]);
+    const rows *truth = shown(&tables[5]), *states = shown(&tables[0]);
+    const quantity all[] = {
+        {"Joint coordinates (of sliders 1/57.3 m)", "q_", "deg", states, NULL, truth, "q_",
+         MHI_DEGREES, 1},
+        {"Activation against EMG", "a_", "of 1", states, shown(&tables[3]), truth, "a_", 1, 0.1},
+        {"Muscle forces", "", "N", shown(&tables[1]), NULL, truth, "F_", 1, 10},
+        {"Distance of markers", "", "mm", shown(&tables[2]), NULL, NULL, "", 1e3, 1},
+        {"Solve time", "solve_", "ms", shown(&tables[4]), NULL, NULL, "", 1, 1}};
+    for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+        add_all(out, &all[i]);
+    }
 }
 
-mhe_status report_write(const char *dir, const char *name, const char *summary, mhe_error *err) {
+mhe_status report_write(const char *dir, const char *name, const char *summary,
+                        const char *reference, mhe_error *err) {
     static const char *const files[] = {"estimates.sto", "forces.sto", "marker_residuals.sto",
                                         "emg.sto", "quality.sto"};
-    rows tables[5] = {{0}};
+    rows tables[6] = {{0}}; /* the last: the known truth */
     mhi_text page = {0};
     mhe_outbox *outbox = NULL;
     mhe_status status = rows_read_in(dir, files[0], &tables[0], err);
     for (int i = 1; i < 5 && status == MHE_OK; i++) {
         /* without muscles or markers a table has no columns and cannot be read */
         (void)rows_read_in(dir, files[i], &tables[i], NULL);
+    }
+    if (status == MHE_OK && reference != NULL) {
+        (void)rows_read(reference, &tables[5], NULL);
     }
     if (status == MHE_OK) {
         compose(&page, name, summary, tables);
@@ -164,7 +196,7 @@ mhe_status report_write(const char *dir, const char *name, const char *summary, 
     }
     mhe_outbox_close(outbox);
     mhi_text_free(&page);
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 6; i++) {
         rows_close(&tables[i]);
     }
     return status;

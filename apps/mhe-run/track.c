@@ -11,6 +11,7 @@
 
 #include <mhe/library.h>
 #include <string.h>
+#include <time.h>
 
 typedef struct tracking {
     const track_setup *setup;
@@ -250,6 +251,28 @@ static void draw(tracking *t) {
     mhe_free(reference);
 }
 
+/* What, when and with what: above the report's findings. */
+static void add_facts(const tracking *t, mhi_text *out) {
+    static const char *const keys[] = {"model.file", "data.markers", "data.emg", "data.angles",
+                                       "data.reference"};
+    const time_t now = time(NULL);
+    struct tm utc;
+    char date[64];
+    if (gmtime_r(&now, &utc) != NULL &&
+        strftime(date, sizeof date, "%Y-%m-%d %H:%M UTC", &utc) > 0) {
+        mhi_text_add(out, "date: %s\n", date);
+    }
+    for (size_t i = 0; i < sizeof keys / sizeof keys[0]; i++) {
+        char *value = NULL;
+        if (mhe_config_get(t->setup->config, keys[i], &value, NULL) == MHE_OK && *value != '\0') {
+            mhi_text_add(out, "%s: %s\n", keys[i], value);
+        }
+        mhe_free(value);
+    }
+    mhi_text_add(out, "solver: %s, windows of %d intervals of %.4g ms\n", t->summary.info.solver,
+                 t->summary.info.window, 1e3 * t->summary.info.interval);
+}
+
 static void tell(const tracking *t) {
     mhi_text text = {0};
     mhe_error why = {0};
@@ -263,10 +286,18 @@ static void tell(const tracking *t) {
     if (!text.failed) {
         (void)fputs(text.data, stdout);
         (void)printf("results in %s; open %s/report.html\n", t->setup->out, t->setup->out);
-        if (report_write(t->setup->out, mhe_config_name(t->setup->config), text.data, &why) !=
-            MHE_OK) {
+        mhi_text page = {0};
+        add_facts(t, &page);
+        mhi_text_add(&page, "%s", text.data);
+        char *reference = NULL;
+        (void)mhe_config_get(t->setup->config, "data.reference", &reference, NULL);
+        const char *truth = reference != NULL && *reference != '\0' ? reference : NULL;
+        if (!page.failed && report_write(t->setup->out, mhe_config_name(t->setup->config),
+                                         page.data, truth, &why) != MHE_OK) {
             t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
         }
+        mhe_free(reference);
+        mhi_text_free(&page);
     }
     mhi_text_free(&text);
 }
