@@ -296,7 +296,14 @@ static mhe_status read_forces(const struct reader *r, const mhi_section *section
     }
     for (int32_t i = 0; i < n && status == MHE_OK; i++) {
         const mhe_plugin *plugin = NULL;
-        if (mhi_registry_find(r->registry, ids[i], section->iface, &plugin, NULL) == MHE_OK) {
+        mhe_error why = {0};
+        const mhe_status found =
+            mhi_registry_find(r->registry, ids[i], section->iface, &plugin, &why);
+        if (found == MHE_E_MEMORY ||
+            (found != MHE_OK && mhi_registry_refused_count(r->registry) > 0)) {
+            /* it may be one of the files that could not be loaded: no model without its forces */
+            status = mhe_fail(r->err, found, "%s: forces: %s", run->path, why.text);
+        } else if (found == MHE_OK) {
             status = read_other_force(r, section, ids[i], NULL, NULL,
                                       &run->forces.uses[run->forces.n++]);
         }
