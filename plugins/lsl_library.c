@@ -40,8 +40,8 @@ mhe_status lsl_load(const char *path, lsl_library *out, mhe_error *err) {
         const char *why = dlerror();
         return mhe_fail(
             err, MHE_E_IO,
-            "Lab Streaming Layer needs liblsl, which is not there (%s): install it, name "
-            "its file by 'library', or run ./bootstrap live",
+            "Lab Streaming Layer needs liblsl, which is not there (%s): install it, or name its "
+            "file by 'library'",
             why == NULL ? "no reason given" : why);
     }
     const char *missing = NULL;

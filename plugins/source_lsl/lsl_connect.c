@@ -8,7 +8,9 @@
 
 #define MOST_CHANNELS 4096
 #define MOST_FOUND 16
-#define PULL 512 /* samples at once */
+#define PULL 512   /* samples at once */
+#define ANSWER 2.0 /* s that a sender may take to describe itself, and to connect */
+#define SEARCH 2.0 /* s: less, and the waves of the library's search have not all gone out */
 
 static char *copy(const char *text) {
     char *out = strdup(text == NULL ? "" : text);
@@ -129,7 +131,8 @@ static mhe_status find(lsl_source *source, const lsl_stream *s, double deadline,
                        lsl_streaminfo *out, mhe_error *err) {
     lsl_streaminfo found[MOST_FOUND];
     const lsl_library *l = &source->lsl;
-    const int32_t n = l->resolve_bypred(found, MOST_FOUND, s->predicate, 1, left(deadline));
+    const double seconds = fmax(left(deadline), SEARCH);
+    const int32_t n = l->resolve_bypred(found, MOST_FOUND, s->predicate, 1, seconds);
     mhe_status status = MHE_OK;
     if (n < 1) {
         status = mhe_fail(err, MHE_RETRY, "no stream with %s", s->predicate);
@@ -157,7 +160,7 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, double deadline, mhe_e
     s->inlet = l->create_inlet(info, (int32_t)ceil(source->config.buffer), 0, 1);
     l->destroy_streaminfo(info);
     if (s->inlet != NULL) {
-        whole = l->get_fullinfo(s->inlet, left(deadline), &code);
+        whole = l->get_fullinfo(s->inlet, ANSWER, &code);
     }
     if (whole == NULL) {
         status = mhe_fail(err, MHE_RETRY, "a stream with %s does not answer", s->predicate);
@@ -166,7 +169,7 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, double deadline, mhe_e
         l->destroy_streaminfo(whole);
     }
     if (status == MHE_OK) {
-        l->open_stream(s->inlet, left(deadline), &code);
+        l->open_stream(s->inlet, ANSWER, &code);
         status = code == lsl_no_error
                      ? MHE_OK
                      : mhe_fail(err, MHE_RETRY, "stream '%s' does not open", s->name);
@@ -175,6 +178,11 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, double deadline, mhe_e
         lsl_disconnect(source, s);
         return status;
     }
-    s->newest = lsl_now();
+    /* The first measurement of its clock takes packets to and fro; later ones are made behind the
+     * scenes, and asking for them does not wait. */
+    const double offset = l->time_correction(s->inlet, ANSWER, &code);
+    s->has_offset = code == lsl_no_error && isfinite(offset);
+    s->offset = s->has_offset ? offset : 0;
+    s->newest = s->asked = lsl_now();
     return MHE_OK;
 }

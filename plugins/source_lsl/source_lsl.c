@@ -108,27 +108,6 @@ static void tell(const mhe_source_taker *taker, int32_t event, int32_t i, const 
     taker->event(taker->data, event, i, text);
 }
 
-/* Has a sender that came back other channels or labels? The library reconnects by itself to a
- * sender of the same source id; its description may be another then. */
-static mhe_status reopen(lsl_source *source, int32_t i, const mhe_source_taker *taker,
-                         mhe_error *err) {
-    lsl_stream fresh = {.predicate = source->streams[i].predicate, .kind = source->streams[i].kind};
-    lsl_stream *s = &source->streams[i];
-    const mhe_status status = lsl_connect(source, &fresh, lsl_now() + 0.05, err);
-    if (status != MHE_OK) {
-        return status > 0 ? MHE_OK : status;
-    }
-    int same = fresh.n_channels == s->n_channels && fresh.rate == s->rate;
-    for (int32_t k = 0; k < fresh.n_channels && same; k++) {
-        same = strcmp(fresh.labels[k], s->labels[k]) == 0;
-    }
-    lsl_disconnect(source, s);
-    *s = fresh;
-    tell(taker, same ? MHE_SOURCE_BACK : MHE_SOURCE_CHANGED, i, s,
-         same ? "is back" : "is back with other channels");
-    return MHE_OK;
-}
-
 /* Samples that are there, at most one pull; returns how many. */
 static int32_t pull(lsl_source *source, int32_t i, double wait, const mhe_source_taker *taker) {
     lsl_stream *s = &source->streams[i];
@@ -154,36 +133,30 @@ static int32_t pull(lsl_source *source, int32_t i, double wait, const mhe_source
     return n;
 }
 
-static mhe_status watch(lsl_source *source, int32_t i, const mhe_source_taker *taker,
-                        mhe_error *err) {
+/* The library itself finds a sender again that has the same source id. */
+static void watch(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
     lsl_stream *s = &source->streams[i];
-    const double now = lsl_now();
-    if (!s->lost && s->rate > 0 && now - s->newest > QUIET) {
+    if (!s->lost && s->rate > 0 && lsl_now() - s->newest > QUIET) {
         s->lost = 1;
         tell(taker, MHE_SOURCE_LOST, i, s, "sends nothing any more");
     }
-    if (s->lost && now - s->newest > 2 * QUIET) {
-        s->newest = now - QUIET; /* the next look is in a second */
-        return reopen(source, i, taker, err);
-    }
-    return MHE_OK;
 }
 
 static mhe_status lsl_source_read(void *self, double deadline, const mhe_source_taker *taker,
                                   mhe_error *err) {
+    (void)err;
     lsl_source *source = self;
-    mhe_status status = MHE_OK;
     int32_t n = 0;
     do {
-        for (int32_t i = 0; i < source->n_streams && status == MHE_OK; i++) {
+        for (int32_t i = 0; i < source->n_streams; i++) {
             /* the first stream waits for all: pulls with a timeout return as soon as one sample is
              * there */
             const double wait = n == 0 && i == 0 ? WAIT : 0;
             n += pull(source, i, wait, taker);
-            status = watch(source, i, taker, err);
+            watch(source, i, taker);
         }
-    } while (n == 0 && status == MHE_OK && lsl_now() < deadline);
-    return status;
+    } while (n == 0 && lsl_now() < deadline);
+    return MHE_OK;
 }
 
 static mhe_status lsl_source_clock_offset(void *self, int32_t i, double *offset, mhe_error *err) {
@@ -191,10 +164,8 @@ static mhe_status lsl_source_clock_offset(void *self, int32_t i, double *offset,
     lsl_stream *s = &source->streams[i];
     const double now = lsl_now();
     int32_t code = 0;
-    if (s->inlet != NULL && (!s->has_offset || now - s->asked > CLOCK_EVERY)) {
-        /* the first takes a packet to and fro; later ones are measured in the background */
-        const double measured =
-            source->lsl.time_correction(s->inlet, s->has_offset ? 0.0 : 1.0, &code);
+    if (s->inlet != NULL && now - s->asked > CLOCK_EVERY) {
+        const double measured = source->lsl.time_correction(s->inlet, 0.0, &code);
         s->asked = now;
         if (code == lsl_no_error && isfinite(measured)) {
             s->offset = measured;
