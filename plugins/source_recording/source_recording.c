@@ -251,7 +251,6 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
             for (int32_t k = 0; k < s->n_tracks; k++) {
                 s->tracks[k].next = 0;
             }
-            s->begun = now() + 10; /* a gap in time: the window begins anew */
             taker->event(taker->data, MHE_SOURCE_WARNING, -1, "the recording begins again");
             s->begun = now();
             continue;

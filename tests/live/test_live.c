@@ -128,6 +128,19 @@ static void twice_as_fast_by_the_clock(void **state) {
     assert_true(same_files("third", "fourth", "live_emg.sto"));
 }
 
+/* data.transform holds for streams as for files: five metres off, nothing fits the model. */
+static void markers_are_turned_into_the_models_frame(void **state) {
+    (void)state;
+    char *summary = NULL;
+    mhe_error err = {0};
+    assert_int_equal(run("shifted", DEMO "]\ndata:\n  transform:\n    shift: [5, 0, 0", NULL,
+                         &summary, NULL, &err),
+                     MHE_OK);
+    assert_int_equal((int)number_of(summary, "frames"), 301);
+    assert_int_equal((int)number_of(summary, "estimates"), 0);
+    mhe_free(summary);
+}
+
 static void refused(const char *sources, const char *said) {
     mhe_error err = {0};
     const mhe_status status = run("refused", sources, NULL, NULL, NULL, &err);
@@ -165,6 +178,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(recorded_and_repeated),
         cmocka_unit_test(twice_as_fast_by_the_clock),
+        cmocka_unit_test(markers_are_turned_into_the_models_frame),
         cmocka_unit_test(what_cannot_run),
     };
     return cmocka_run_group_tests(tests, begin, clean);

@@ -246,7 +246,6 @@ void mhi_inlet_close(mhi_inlet *in) {
 }
 
 void mhi_inlet_take(mhi_inlet *in, const mhi_run *run, const double *values) {
-    (void)run;
     for (int32_t i = 0; i < in->width; i++) {
         const double value = in->column[i] < 0 ? NAN : values[in->column[i]];
         in->row[i] = isfinite(value) ? in->factor[i] * value : NAN;
@@ -256,6 +255,8 @@ void mhi_inlet_take(mhi_inlet *in, const mhi_run *run, const double *values) {
         if (p[0] == 0 && p[1] == 0 && p[2] == 0) { /* how several systems write a gap */
             p[0] = p[1] = p[2] = NAN;
             in->n_zero++;
+        } else {
+            mhi_run_transform(run, 1, p); /* NaN stays NaN */
         }
     }
 }

@@ -47,8 +47,8 @@ mhe_status mhi_inlet_open(const mhi_inlet_setup *setup, const mhi_stream *about,
                           int32_t stream, double delay, mhi_inlet *inlet, mhe_error *err);
 void mhi_inlet_close(mhi_inlet *inlet);
 
-/* The sample's values in the order and units of its channel, in inlet->row; NaN where there are
- * none. Not of electrodes. [hot] */
+/* The sample's values in the order and units of its channel, markers in the model's frame
+ * (data.transform), in inlet->row; NaN where there are none. Not of electrodes. [hot] */
 void mhi_inlet_take(mhi_inlet *inlet, const mhi_run *run, const double *values);
 
 #endif

@@ -134,6 +134,9 @@ static const double *measured(const mhe_estimate *e, int32_t channel) {
 }
 
 void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
+    if (o->n == 0) {
+        return;
+    }
     const double *const values[N_SIGNALS] = {[Q] = e->q,
                                              [QDOT] = e->qdot,
                                              [ACTIVATION] = e->activation,
@@ -144,9 +147,6 @@ void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
                                              [MARKERS] = e->markers,
                                              [EMG] = measured(e, o->emg_channel),
                                              [MEASURED] = measured(e, o->markers_channel)};
-    if (o == NULL || o->n == 0) {
-        return;
-    }
     const double head[HEAD] = {(double)o->number++, e->time,       host_time,
                                e->status,           e->iterations, e->solve_time};
     double *at = put(o->record, head, HEAD);

@@ -188,6 +188,9 @@ static mhe_status from_xdf(owned *o, mhe_error *err) {
             status = add_xdf_stream(o, s, arrivals != NULL, err);
         }
     }
+    if (status == MHE_OK && o->face.n_streams == 0) {
+        status = mhe_fail(err, MHE_E_INPUT, "%s: holds no stream of numbers", o->xdf->path);
+    }
     if (status == MHE_OK && arrivals != NULL) {
         status = take_arrivals(o, arrivals, number, most, err);
     }
