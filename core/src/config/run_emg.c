@@ -39,8 +39,7 @@ static mhe_status check_section(const mhi_run *run, const mhi_node *section, mhe
     const mhi_node *sources = mhi_node_find(mhi_tree_root(run->tree), "sources");
     if (run->data.emg == NULL && (sources == NULL || sources->first == NULL)) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, section,
-                           "emg: there are channels, but data.emg names no file, and there are no "
-                           "sources");
+                           "emg: there are channels, but data.emg names no file");
     }
     return MHE_OK;
 }
