@@ -105,53 +105,67 @@ static double distance3(const double *a, const double *b) {
     return sqrt(dot3(d, d));
 }
 
-/* Puts wrap w where it belongs in the course without it. */
-static void wrap_insert(const path_route *route, int32_t w, route_work *work) {
+/* One piece that wrap w may go over: what became of it in `string`. */
+static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, const course_stop *a,
+                        const course_stop *b, const route_work *work, wrap_string *string) {
+    const double *tried = work->tried + 6 * w;
+    const wrap_string *last = before > 0 ? &work->strings[w] : NULL;
+    if (last != NULL && memcmp(tried, a->at, sizeof a->at) == 0 &&
+        memcmp(tried + 3, b->at, sizeof b->at) == 0) {
+        *string = *last;
+        return before;
+    }
+    return string_between(route, w, a->at, b->at, last, work, string);
+}
+
+/* Puts wrap w where it belongs in the course without it. 1: there it was. */
+static int wrap_insert(const path_route *route, int32_t w, route_work *work) {
     const route_wrap *wrap = &route->wraps[w];
-    int32_t from, to, best = -1;
-    double least = INFINITY, *tried = work->tried + 6 * w, ends[6];
-    wrap_string string, chosen = work->strings[w], last = chosen;
-    int32_t before = work->state[w];
-    stops_remove(work, w);
+    int32_t from, to, best = -1, before = work->state[w], now = WRAP_NONE, which = 0;
+    double least = INFINITY;
+    wrap_string strings[2]; /* the one tried, the best one */
+    if (before > 0) {
+        stops_remove(work, w);
+    }
     work->state[w] = WRAP_NONE;
     if (stops_range(wrap, work, &from, &to) != 0) {
-        return;
+        return before <= 0;
     }
     for (int32_t i = from; i < to; i++) {
         const course_stop *a = &work->stops[i], *b = &work->stops[i + 1];
         if (a->wrap >= 0 && a->wrap == b->wrap) {
             continue;
         }
-        int32_t state;
-        if (before > 0 && memcmp(tried, a->at, sizeof a->at) == 0 &&
-            memcmp(tried + 3, b->at, sizeof b->at) == 0) {
-            state = before;
-            string = last;
-        } else {
-            state =
-                string_between(route, w, a->at, b->at, before > 0 ? &last : NULL, work, &string);
+        int32_t state = wrap_try(route, w, before, a, b, work, &strings[which]);
+        if (best < 0 && now != WRAP_INSIDE) {
+            now = state; /* of what does not wrap, the first that is inside is told */
         }
-        if (best < 0 && work->state[w] != WRAP_INSIDE) {
-            work->state[w] = state; /* of what does not wrap, the first that is inside is told */
-        }
-        double longer = state > 0 ? wrap_length(&string) - distance3(a->at, b->at) : INFINITY;
+        double longer =
+            state > 0 ? wrap_length(&strings[which]) - distance3(a->at, b->at) : INFINITY;
         if (state == WRAP_CROSSED || longer < least) {
             least = longer;
             best = i;
-            chosen = string;
-            work->state[w] = state;
-            memcpy(ends, a->at, sizeof a->at);
-            memcpy(ends + 3, b->at, sizeof b->at);
+            now = state;
+            which = 1 - which;
         }
         if (state == WRAP_CROSSED) {
             break;
         }
     }
-    if (best >= 0) {
-        work->strings[w] = chosen;
-        memcpy(tried, ends, sizeof ends);
-        stops_insert(work, best, w, wrap->link);
+    work->state[w] = now;
+    if (best < 0) {
+        return before <= 0;
     }
+    double *tried = work->tried + 6 * w;
+    int same = before == now && memcmp(tried, work->stops[best].at, 3 * sizeof *tried) == 0 &&
+               memcmp(tried + 3, work->stops[best + 1].at, 3 * sizeof *tried) == 0;
+    if (!same) {
+        work->strings[w] = strings[1 - which];
+        memcpy(tried, work->stops[best].at, 3 * sizeof *tried);
+        memcpy(tried + 3, work->stops[best + 1].at, 3 * sizeof *tried);
+    }
+    stops_insert(work, best, w, wrap->link);
+    return same;
 }
 
 /* A number that tells one order of stops from another. */
@@ -182,13 +196,17 @@ static int course_has_joints(const route_work *work) {
 
 static void wraps_insert(const path_route *route, route_work *work) {
     uint64_t last = 0;
+    int32_t calm = 0; /* wraps in turn that stayed where they were: all of them, and it is done */
     for (int32_t w = 0; w < route->n_wraps; w++) {
         work->order[w] = w;
         work->state[w] = WRAP_NONE;
     }
     for (int32_t pass = 0; pass < MAX_PASSES; pass++) {
         for (int32_t k = 0; k < route->n_wraps; k++) {
-            wrap_insert(route, work->order[k], work);
+            calm = wrap_insert(route, work->order[k], work) ? calm + 1 : 0;
+            if (pass > 0 && calm >= route->n_wraps) {
+                return;
+            }
         }
         uint64_t digest = stops_digest(work);
         if (route->n_wraps < 2 || (digest == last && (pass > 1 || !course_has_joints(work)))) {
@@ -198,6 +216,8 @@ static void wraps_insert(const path_route *route, route_work *work) {
         if (pass == 0 && work->state[0] == WRAP_NONE && work->state[1] == WRAP_INSIDE) {
             work->order[0] = 1; /* what the first is in the way of comes first */
             work->order[1] = 0;
+        } else if (calm >= route->n_wraps) {
+            return;
         }
     }
 }
