@@ -11,7 +11,8 @@
 #define CLOCK_EVERY 2.0 /* s between two looks at a sender's clock */
 #define CLOCK_FIRST 2.0 /* s that the first look may take */
 #define LOOK_EVERY 0.1  /* s between two looks at a search */
-#define WAIT 0.001      /* s of one pull */
+#define WAIT 0.0003     /* s between two looks where nothing is there */
+#define MOST_PULLS 64   /* of one stream in a row */
 
 double lsl_now(void) {
     struct timespec t;
@@ -93,13 +94,26 @@ static mhe_status open_missing(lsl_source *source, mhe_error *err) {
     return first;
 }
 
+/* What came while the others were connected belongs to no run. */
+static mhe_status drop_backlog(lsl_source *source) {
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        lsl_stream *s = &source->streams[i];
+        const unsigned long most = s->room * (unsigned long)s->n_channels;
+        int32_t code = 0;
+        while (source->lsl.pull_chunk_d(s->inlet, s->values, s->stamps, most, s->room, 0, &code) >
+               0) {
+        }
+    }
+    return MHE_OK;
+}
+
 static mhe_status lsl_source_open(void *self, double deadline, mhe_error *err) {
     mhe_status status = open_missing(self, err);
     while (status == MHE_RETRY && lsl_now() < deadline) {
         rest(LOOK_EVERY / 2);
         status = open_missing(self, err);
     }
-    return status;
+    return status == MHE_OK ? drop_backlog(self) : status;
 }
 
 static int32_t lsl_source_count(const void *self) {
@@ -132,15 +146,14 @@ static void tell(const mhe_source_taker *taker, int32_t event, int32_t i, const 
 }
 
 /* Samples that are there, at most one pull; returns how many. */
-static int32_t pull(lsl_source *source, int32_t i, double wait, const mhe_source_taker *taker) {
+static int32_t pull(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
     lsl_stream *s = &source->streams[i];
     int32_t code = 0;
     if (s->inlet == NULL) {
         return 0;
     }
-    const unsigned long elements =
-        source->lsl.pull_chunk_d(s->inlet, s->values, s->stamps,
-                                 s->room * (unsigned long)s->n_channels, s->room, wait, &code);
+    const unsigned long elements = source->lsl.pull_chunk_d(
+        s->inlet, s->values, s->stamps, s->room * (unsigned long)s->n_channels, s->room, 0, &code);
     const int32_t n = (int32_t)(elements / (unsigned long)s->n_channels);
     if (n > 0) {
         const mhe_chunk chunk = {.size = sizeof chunk,
@@ -231,22 +244,36 @@ static void watch(lsl_source *source, int32_t i, const mhe_source_taker *taker) 
     }
 }
 
+/* All that is there of the streams that make frames, or of all others. */
+static int32_t drain(lsl_source *source, int markers, const mhe_source_taker *taker) {
+    int32_t total = 0;
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        int32_t n = 0;
+        for (int k = 0;
+             k < MOST_PULLS && markers == (source->streams[i].kind == MHE_STREAM_MARKERS); k++) {
+            n = pull(source, i, taker);
+            total += n;
+            if ((unsigned long)n < source->streams[i].room) {
+                break;
+            }
+        }
+    }
+    return total;
+}
+
+/* Frames come last: what was measured by then is there already. */
 static mhe_status lsl_source_read(void *self, double deadline, const mhe_source_taker *taker,
                                   mhe_error *err) {
     (void)err;
     lsl_source *source = self;
     int32_t n = 0;
     do {
-        int waited = 0;
+        n = drain(source, 0, taker);
+        n += drain(source, 1, taker);
         for (int32_t i = 0; i < source->n_streams; i++) {
-            /* the first that is there waits for all: pulls with a timeout return as soon as one
-             * sample is there */
-            const int alone = source->streams[i].inlet != NULL && n == 0 && !waited;
-            n += pull(source, i, alone ? WAIT : 0, taker);
-            waited |= alone;
             watch(source, i, taker);
         }
-        if (!waited) {
+        if (n == 0) {
             rest(WAIT);
         }
     } while (n == 0 && lsl_now() < deadline);

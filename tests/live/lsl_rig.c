@@ -19,23 +19,26 @@ void lsl_rig_rest(double seconds) {
     (void)nanosleep(&t, NULL);
 }
 
-/* Loopback alone; a session of its own keeps apart what else runs on this machine. */
+/* Loopback alone; a session of its own keeps apart what else runs on this machine. Version 1.12
+ * looks for the file in the working directory, newer ones where LSLAPICFG says. */
 static int write_config(const char *folder) {
     char path[512];
-    if (getenv("LSLAPICFG") != NULL) {
-        return 1; /* of the process that started this one */
-    }
     (void)snprintf(path, sizeof path, "%s/lsl_api.cfg", folder);
-    FILE *file = fopen(path, "w");
-    if (file == NULL) {
-        return 0;
+    if (access(path, F_OK) != 0) { /* else it is of the process that started this one */
+        FILE *file = fopen(path, "w");
+        if (file == NULL) {
+            return 0;
+        }
+        (void)fprintf(file,
+                      "[ports]\nIPv6 = disable\n[multicast]\nResolveScope = machine\n"
+                      "ListenAddress = 127.0.0.1\nAddressesOverride = {127.0.0.1}\n"
+                      "[lab]\nKnownPeers = {127.0.0.1}\nSessionID = mhe-test-%d\n",
+                      (int)getpid());
+        if (fclose(file) != 0) {
+            return 0;
+        }
     }
-    (void)fprintf(file,
-                  "[ports]\nIPv6 = disable\n[multicast]\nResolveScope = machine\n"
-                  "ListenAddress = 127.0.0.1\nAddressesOverride = {127.0.0.1}\n"
-                  "[lab]\nKnownPeers = {127.0.0.1}\nSessionID = mhe-test-%d\n",
-                  (int)getpid());
-    return fclose(file) == 0 && setenv("LSLAPICFG", path, 1) == 0;
+    return setenv("LSLAPICFG", path, 1) == 0 && chdir(folder) == 0;
 }
 
 int lsl_rig_open(const char *folder, lsl_rig *rig) {
