@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* loops.c: how far loops are open, how fast, and the derivatives of both.
  *
- * A point x fixed to link i moves with x' = v + w x x and x'' = a + al x x + w x x', [w, v] and [al,
- * a] the link's velocity and acceleration, spatial in ground. Turning joint j carries x along S_j,
- * and changes (symbols of dynamics.c)
- *     d[w, v] = S_j x [w, v] + S'_j,     d[al, a] = S_j x [al, a] + S''_j - [w, v] x S'_j,
- * a change of its speed d[w, v] = S_j, d[al, a] = 2 S'_j - [w, v] x S_j. */
+ * A point x fixed to link i moves with x' = v + w x x and x'' = a + al x x + w x x', [w, v] and
+ * [al, a] the link's velocity and acceleration, spatial in ground. Turning joint j carries x along
+ * S_j, and changes (symbols of dynamics.c) d[w, v] = S_j x [w, v] + S'_j,     d[al, a] = S_j x [al,
+ * a] + S''_j - [w, v] x S'_j, a change of its speed d[w, v] = S_j, d[al, a] = 2 S'_j - [w, v] x
+ * S_j. */
 #include "context.h"
 #include "vector.h"
 

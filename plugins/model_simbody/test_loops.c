@@ -44,8 +44,8 @@ static mhe_description closed_tangle(const double *q) {
             loop->p[1][row] = 0;
             for (int k = 0; k < 3; k++) {
                 loop->p[1][row] += two[3 + 3 * k + row] * (p[k] - two[k]);
-                loop->r[1][3 * row + k] = two[3 + row] * r[k] + two[6 + row] * r[3 + k] +
-                                          two[9 + row] * r[6 + k];
+                loop->r[1][3 * row + k] =
+                    two[3 + row] * r[k] + two[6 + row] * r[3 + k] + two[9 + row] * r[6 + k];
             }
         }
     }
@@ -273,7 +273,8 @@ static void simbody_says_the_same(void **state) {
             }
             mhe_loop_values out = {.gap = own[0], .rate = own[1], .acceleration = own[2]};
             assert_int_equal(values(&p, q, v, &out), MHE_OK);
-            out = (mhe_loop_values){.gap = simbody[0], .rate = simbody[1], .acceleration = simbody[2]};
+            out = (mhe_loop_values){
+                .gap = simbody[0], .rate = simbody[1], .acceleration = simbody[2]};
             assert_int_equal(values(&ps, q, v, &out), MHE_OK);
             for (int k = 0; k < (open ? 2 : 3); k++) {
                 for (int j = 0; j < n_c; j++) {

@@ -416,7 +416,7 @@ AT(mhe_load, body, 0);
 AT(mhe_load, axes, 4);
 AT(mhe_load, origin, 8);
 
-SIZE(mhe_model_ops, 88);
+SIZE(mhe_model_ops, 96);
 AT(mhe_model_ops, size, 0);
 AT(mhe_model_ops, create, 8);
 AT(mhe_model_ops, destroy, 16);
@@ -428,6 +428,17 @@ AT(mhe_model_ops, forward_dynamics, 56);
 AT(mhe_model_ops, loads, 64);
 AT(mhe_model_ops, path_pattern, 72);
 AT(mhe_model_ops, path_points, 80);
+AT(mhe_model_ops, loops, 88);
+SIZE(mhe_loop_values, 72);
+AT(mhe_loop_values, size, 0);
+AT(mhe_loop_values, gap, 8);
+AT(mhe_loop_values, gap_q, 16);
+AT(mhe_loop_values, rate, 24);
+AT(mhe_loop_values, rate_q, 32);
+AT(mhe_loop_values, rate_v, 40);
+AT(mhe_loop_values, acceleration, 48);
+AT(mhe_loop_values, acceleration_q, 56);
+AT(mhe_loop_values, acceleration_v, 64);
 
 SIZE(mhe_muscle_layout, 80);
 AT(mhe_muscle_layout, size, 0);

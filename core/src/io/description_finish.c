@@ -118,11 +118,6 @@ static void note_uncarried(mhi_builder *b, const mhe_description *d) {
         mhi_build_unsupported(b, 0, "%d BushingForce%s: what it pulls is missing",
                               (int)d->n_bushings, d->n_bushings == 1 ? "" : "s");
     }
-    if (d->n_loops > 0) {
-        mhi_build_unsupported(
-            b, 0, "%d loop%s (PointConstraint, WeldConstraint) that nothing holds together",
-            (int)d->n_loops, d->n_loops == 1 ? "" : "s");
-    }
     if (d->n_actuators > 0) {
         mhi_build_dropped(b, 0,
                           "%d actuator%s, not driven; residual torques do that work where "
