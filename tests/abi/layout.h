@@ -488,7 +488,7 @@ AT(mhe_muscle_ops, evaluate, 32);
 AT(mhe_muscle_ops, diagonal_rate, 40);
 AT(mhe_muscle_ops, equilibrium, 48);
 
-SIZE(mhe_force_layout, 88);
+SIZE(mhe_force_layout, 104);
 AT(mhe_force_layout, size, 0);
 AT(mhe_force_layout, name, 8);
 AT(mhe_force_layout, generalised, 16);
@@ -501,16 +501,25 @@ AT(mhe_force_layout, n_loads, 56);
 AT(mhe_force_layout, loads, 64);
 AT(mhe_force_layout, n_parameters, 72);
 AT(mhe_force_layout, parameter_names, 80);
+AT(mhe_force_layout, n_pairs, 88);
+AT(mhe_force_layout, pairs, 96);
 
-SIZE(mhe_force_point, 48);
+SIZE(mhe_frame_pair, 200);
+AT(mhe_frame_pair, body, 0);
+AT(mhe_frame_pair, r, 8);
+AT(mhe_frame_pair, p, 152);
+
+SIZE(mhe_force_point, 64);
 AT(mhe_force_point, size, 0);
 AT(mhe_force_point, q, 8);
 AT(mhe_force_point, v, 16);
 AT(mhe_force_point, length, 24);
 AT(mhe_force_point, velocity, 32);
 AT(mhe_force_point, input, 40);
+AT(mhe_force_point, deflection, 48);
+AT(mhe_force_point, deflection_rate, 56);
 
-SIZE(mhe_force_values, 96);
+SIZE(mhe_force_values, 120);
 AT(mhe_force_values, size, 0);
 AT(mhe_force_values, tau, 8);
 AT(mhe_force_values, tau_q, 16);
@@ -523,6 +532,9 @@ AT(mhe_force_values, tension_w, 64);
 AT(mhe_force_values, tension_p, 72);
 AT(mhe_force_values, load, 80);
 AT(mhe_force_values, load_w, 88);
+AT(mhe_force_values, push, 96);
+AT(mhe_force_values, push_d, 104);
+AT(mhe_force_values, push_w, 112);
 
 SIZE(mhe_force_ops, 56);
 AT(mhe_force_ops, size, 0);

@@ -196,7 +196,8 @@ static mhe_status kinematics(mhi_system_context *c, const double *q, const doubl
                                 .bias = dynamics ? c->bias : NULL,
                                 .length = c->length,
                                 .length_q = c->length_q,
-                                .length_qq = derivatives ? c->length_qq : NULL};
+                                .length_qq = derivatives ? c->length_qq : NULL,
+                                .body = c->system->most_pairs > 0 ? c->body : NULL};
     return c->system->model->kinematics(c->model, q, v, &out, err);
 }
 

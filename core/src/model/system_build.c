@@ -216,6 +216,7 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
     const int32_t n_p_all = s->n_parameters > 0 ? s->muscle_layout.n_parameters : 0;
     const int32_t n_s = n_m * s->n_s, other = s->n_forces > 0 ? n_q : 0, n_t = s->most_paths;
     const int32_t n_c = s->n_c, wide = most_columns(s);
+    const int32_t n_f = s->most_pairs, per_pair = n_f > 0 ? n_q : 0;
     struct {
         double **array;
         int32_t n;
@@ -257,6 +258,17 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                   {&c->t_length, n_t},
                   {&c->t_velocity, n_t},
                   {&c->load, 9 * s->most_loads},
+                  {&c->body, n_f > 0 ? 12 * s->description->n_bodies : 0},
+                  {&c->deflection, 6 * n_f},
+                  {&c->deflection_rate, 6 * n_f},
+                  {&c->push, 6 * n_f},
+                  {&c->push_d, 36 * n_f},
+                  {&c->push_w, 36 * n_f},
+                  {&c->pair_rows, 6 * n_f * n_q},
+                  {&c->pair_loads, 36 * per_pair},
+                  {&c->pair_q, per_pair * n_q},
+                  {&c->pair_work, 18 * per_pair},
+                  {&c->pair_turn, 3 * per_pair},
                   {&c->row_q, n_q},
                   {&c->row_v, n_q},
                   {&c->all_force_p, n_p_all * n_m},

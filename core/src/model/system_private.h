@@ -39,11 +39,11 @@ struct mhi_system {
     int32_t *first, *end; /* [n_paths] coordinates that a path sees lie in [first, end) */
     int32_t *z_state;     /* [n_z] which of its muscle's states an entry of z is */
     mhi_force *forces;
-    int32_t n_forces;                            /* that do something */
-    int32_t most_inputs, most_paths, most_loads; /* of one force */
-    int32_t n_c;                                 /* rows of the description's loops */
-    mhe_load *loop_loads;                        /* [n_loop_loads] what closes them acts on */
-    int32_t *loop_of;                            /* [n_loop_loads] 2 loop + (0, 1) frame */
+    int32_t n_forces;                                        /* that do something */
+    int32_t most_inputs, most_paths, most_loads, most_pairs; /* of one force */
+    int32_t n_c;                                             /* rows of the description's loops */
+    mhe_load *loop_loads; /* [n_loop_loads] what closes them acts on */
+    int32_t *loop_of;     /* [n_loop_loads] 2 loop + (0, 1) frame */
     int32_t n_loop_loads;
     mhi_arena arena;
 };
@@ -66,7 +66,12 @@ struct mhi_system_context {
     double *own, *own_q, *own_v;                      /* of one of them */
     double *tension, *tension_l, *tension_w, *t_length, *t_velocity; /* [most_paths] */
     double *load;                                                    /* [most_loads x 9] */
-    double *row_q, *row_v;                                           /* [n_q] */
+    double *body;                           /* [n_b x 12], where forces have pairs of frames */
+    double *deflection, *deflection_rate;   /* [most_pairs x 6] */
+    double *push, *push_d, *push_w;         /* [most_pairs x 6], [most_pairs x 6 x 6] */
+    double *pair_rows, *pair_loads;         /* [most_pairs x 6 x n_q], [n_q x 36] */
+    double *pair_q, *pair_work, *pair_turn; /* [n_q x n_q], [18 x n_q], [3 x n_q] */
+    double *row_q, *row_v;                  /* [n_q] */
     double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
     double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */
     double *gap, *gap_q;              /* of the loops: [n_c], [n_c x n_q] */
@@ -104,6 +109,13 @@ void mhi_path_moment(const mhi_system_context *c, int32_t path, double force, do
 void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, double force,
                                  double force_l, double force_w, double *force_q, double *force_v,
                                  double *moment_q, double *moment_v);
+
+/* pairs.c, of one force plugin's pair i: how its frames stand, into the context; after the plugin's
+ * evaluate(): adds what it pushes there to c->other and its derivatives. */
+mhe_status mhi_pairs_place(mhi_system_context *c, const mhe_frame_pair *pair, const double *v,
+                           int32_t i, mhe_error *err);
+mhe_status mhi_pairs_push(mhi_system_context *c, const mhe_frame_pair *pair, const double *v,
+                          int32_t i, int32_t derivatives, mhe_error *err);
 
 /* loops.c. What the setup's loops need of a system; after the open accelerations: adds to vdot
  * [n_q] what keeps the loops closed (c->loop_force does it) and leaves all that the derivatives
