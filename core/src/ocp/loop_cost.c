@@ -36,7 +36,7 @@ static const mhe_cost_ops loop_ops = {.size = sizeof loop_ops,
                                       .jacobian = loop_jacobian};
 
 static const mhe_plugin loop_plugin = {.size = sizeof loop_plugin,
-                                       .id = "mhe.cost.loops",
+                                       .id = "loops of the model",
                                        .version = "0.2.0",
                                        .summary = "Keeps the loops of a model closed.",
                                        .iface = MHE_COST_IFACE,
