@@ -48,8 +48,8 @@ static void run(const char *config, int32_t hide_from, int32_t hide_to, int32_t 
         for (int32_t i = 0; i < e.n_tracked; i++) {
             const mhe_tracked *t = &e.tracked[i];
             mhe_estimator_info info = {.size = sizeof info};
-            assert_int_equal(mhe_estimator_describe(f.estimator, &info, &f.err), MHE_OK);
-            row = strcmp(info.channels[t->channel].name, "rates") == 0 ? i : row;
+            assert_int_equal(mhe_estimator_describe(f.estimator, &info), MHE_OK);
+            row = strcmp(mhe_channel_at(&info, t->channel)->name, "rates") == 0 ? i : row;
         }
         assert_true((row >= 0) == has_rates);
         for (int32_t i = 0; i < N_Q; i++) {
