@@ -241,7 +241,7 @@ static mhe_status take_memory(mhi_ocp *ocp, mhe_error *err) {
 /* Term i, whose refusal begins with "costs.<i>: ". */
 static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t i, mhe_error *err) {
     mhe_status status = mhi_term_create(setup->host, &setup->terms[i], &ocp->problem, &ocp->signals,
-                                        &ocp->arena, &ocp->terms[i], err);
+                                        setup->tasks, &ocp->arena, &ocp->terms[i], err);
     ocp->n_terms_created = i + 1;
     if (status != MHE_OK && err != NULL) {
         const mhe_error why = *err;
