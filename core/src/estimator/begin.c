@@ -11,9 +11,10 @@ mhe_status mhi_begin_create(mhi_begin *b, const mhi_system *system, mhi_system_c
                      .v = MHI_TAKE(arena, double, n_q),
                      .closed = MHI_TAKE(arena, double, n_q),
                      .activation = MHI_TAKE(arena, double, mhi_system_face(system)->n_m),
+                     .near = MHI_TAKE(arena, double, n_q),
                      .distance = MHI_TAKE(arena, double, nodes)};
-    if (b->q == NULL || b->v == NULL || b->closed == NULL || b->activation == NULL ||
-        b->distance == NULL) {
+    if (b->q == NULL || b->v == NULL || b->closed == NULL || b->near == NULL ||
+        b->activation == NULL || b->distance == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     mhi_begin_forget(b);
@@ -218,6 +219,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     memcpy(e->window.solution.u, e->window.guess_u,
            sizeof(double) * (size_t)(e->window.n * e->n_u));
     e->window.solution.has_multipliers = 0;
+    e->window.has_left = 0;
     mhi_phase_on(e, MHI_EVENT_BEGUN);
     e->begin.rounds = 0;
     mhi_window_set_bounds(e);

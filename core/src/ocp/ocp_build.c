@@ -262,7 +262,7 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
     const int32_t own = i >= setup->n_terms; /* of the loops */
     const mhi_term_setup *term = own ? &mhi_loop_terms[i - setup->n_terms] : &setup->terms[i];
     mhe_status status = mhi_term_create(setup->host, term, &ocp->problem, &ocp->signals,
-                                        &ocp->arena, &ocp->terms[i], err);
+                                        setup->tasks, &ocp->arena, &ocp->terms[i], err);
     ocp->n_terms_created = i + 1;
     if (status != MHE_OK && err != NULL && !own) {
         const mhe_error why = *err;
