@@ -99,7 +99,7 @@ static int32_t solve_set(qp *q, double regularisation) {
 static look see(qp *q, const qp_limits *limits) {
     const qp_shape *s = q->shape;
     const double crossed = 0.5 * limits->feasibility, pulled = 0.5 * limits->stationarity;
-    const int32_t simple = s->n_u + s->n_dense, m = s->separable ? s->n_x - s->n_dense : 0;
+    const int32_t simple = s->n_u + s->n_dense, m = s->in_order ? s->n_x - s->n_dense : 0;
     const int32_t first_control = m > 0 ? s->control_of[s->n_dense] : 0;
     look l = {0};
     memset(q->turned, 0, (size_t)s->n_x);
@@ -136,7 +136,7 @@ static look see(qp *q, const qp_limits *limits) {
 }
 
 static void follow_chains(qp *q, const qp_limits *limits) {
-    const int32_t m = q->recursion == QP_KALMAN ? q->shape->n_x - q->shape->n_dense : 0;
+    const int32_t m = q->shape->in_order ? q->shape->n_x - q->shape->n_dense : 0;
     for (int32_t j = 0; j < m; j++) {
         if (q->turned[j]) {
             active_follow(q, j, 0.5 * limits->feasibility, 0.5 * limits->stationarity);

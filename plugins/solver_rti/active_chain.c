@@ -18,7 +18,8 @@ typedef struct chain {
 } chain;
 
 static double curvature(const qp *q, ptrdiff_t at) {
-    return q->kalman.h[at];
+    const qp_shape *s = q->shape;
+    return q->stages[at / s->ld_z].H[(at % s->ld_z) * (s->ld_z + 1)];
 }
 
 static ptrdiff_t e_at(const chain *c, int32_t k) {
