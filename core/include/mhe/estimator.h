@@ -187,7 +187,8 @@ typedef struct mhe_estimate {
     double emg_rms;     /* difference of muscle control and EMG; NaN without EMG */
     const double *q;    /* [n_q], rad (m) */
     const double *qdot; /* [n_q], rad/s (m/s) */
-    const double *activation; /* [n_muscles] */
+    const double *activation; /* [n_muscles]; activation-driven, as residual torques: held over
+                               * intervals, here the mean of the two that meet at this time */
     const double *excitation; /* [n_muscles], at the last node of the interval that leads to it;
                                * activation-driven: NULL */
     const double *force;      /* muscle forces [n_muscles], N */

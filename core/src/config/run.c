@@ -103,6 +103,7 @@ static mhe_status read_plain_sections(const struct reader *r) {
     const mhi_section *s = mhi_run_sections(&n);
     mhe_status status = MHE_OK;
     mhi_run_flatten_rotate(run);
+    status = mhi_run_flatten_weights(run, r->err);
     for (const mhi_section *end = s + n; s < end && status == MHE_OK; s++) {
         if (s->iface == NULL && s->offset != 0) {
             static const char *const lists[] = {"channels", "transform"}; /* within a section */

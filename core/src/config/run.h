@@ -38,6 +38,9 @@ typedef struct mhi_model_section {
     mhe_text_map locked_at; /* coordinates that stay at this value, rad or m */
 } mhi_model_section;
 
+/* The key of data.marker_weights that names a file; one text alone is its value. */
+#define MHI_MARKER_TASK_FILE "file"
+
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
     const char *external_loads;            /* .xml */
@@ -48,7 +51,9 @@ typedef struct mhi_data_section {
     double marker_outlier;  /* m; 0: none */
     int32_t emg_saturation; /* frames; 0: any EMG is believed */
     mhe_text_map labels;    /* name in the file: name in the model */
-    const char *subject;    /* whose labels ("NAME:MARKER") are read; NULL: there is one */
+    mhe_text_map marker_weights; /* marker or pattern: weight; MHI_MARKER_TASK_FILE: a path */
+    int32_t rates;               /* 1: the markers tell joint velocities, too */
+    const char *subject;         /* whose labels ("NAME:MARKER") are read; NULL: there is one */
 } mhi_data_section;
 
 /* From the laboratory's frame to the model's: point -> scale turn point + shift. */

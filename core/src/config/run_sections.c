@@ -72,6 +72,15 @@ static const mhe_option data_options[] = {
     MHE_OPT_MAP(mhi_data_section, labels, 0,
                 "Columns that the files call otherwise than the model, {NAME IN FILE: NAME IN "
                 "MODEL}."),
+    MHE_OPT_MAP(mhi_data_section, marker_weights, 0,
+                "Factor of a marker's squared error where costs compare markers one by one, "
+                "{MARKER or PATTERN*: WEIGHT}, 0 leaves it out; or the path of OpenSim's inverse "
+                "kinematics tasks (.xml), whose coordinate tasks count too; or both, {file: PATH, "
+                "MARKER: WEIGHT}."),
+    MHE_OPT_BOOL(mhi_data_section, rates, 0,
+                 "Joint velocities by inverse kinematics from frame to frame, which the signal "
+                 "qdot is to be close to where a cost follows it: they keep light segments from "
+                 "swinging between the frames."),
     MHE_OPT_TEXT(mhi_data_section, subject, 0, NULL,
                  "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };

@@ -107,7 +107,12 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
         terms[i] =
             (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma, cost->huber};
     }
+    status = mhi_tasks_read(run, e->description, e->host, &e->arena, &e->tasks, err);
+    if (status != MHE_OK) {
+        return status;
+    }
     const mhi_ocp_setup ocp = {.host = e->host,
+                               .tasks = e->tasks,
                                .system = e->system,
                                .integrator = run->integrator.plugin,
                                .integrator_config = run->integrator.config,
@@ -148,6 +153,11 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
     if (status == MHE_OK) {
         status =
             mhi_begin_create(&e->begin, e->system, mhi_ocp_context(e->ocp), n + 1, &e->arena, err);
+    }
+    if (status == MHE_OK) {
+        mhi_start_set_tasks(e->begin.start, e->tasks);
+        status = mhi_rates_create(&e->rates, run, e->system, mhi_ocp_context(e->ocp), e->tasks,
+                                  n + 1, &e->arena, err);
     }
     if (status == MHE_OK) {
         status = mhi_output_create(&e->output, mhi_system_face(e->system), e->n_k, &e->channels,
@@ -246,6 +256,7 @@ void mhe_estimator_close(mhe_estimator *e) {
         return;
     }
     mhi_begin_free(&e->begin);
+    mhi_rates_free(&e->rates);
     mhi_channels_free(&e->channels);
     if (e->solver_self != NULL) {
         e->solver->destroy(e->solver_self);

@@ -14,6 +14,7 @@ typedef struct mhi_output_row {
 
 typedef struct mhi_output {
     double *x, *u; /* [n_x], [n_u] of the system */
+    double *held;  /* [n_u] at the time of the node */
     double *q, *v, *activation, *excitation, *force, *moment, *marker, *residual;
     mhe_tracked *tracked; /* [channels] */
     mhi_output_row *rows; /* [channels] */
