@@ -195,7 +195,7 @@ mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
     const char **room = MHI_TAKE(&arena, const char *, widest);
     if (r != NULL) {
         r->info = *info;
-        r->actuators = actuators;
+        r->actuators = mhe_layout_find(info->layout, MHE_ROLE_CONTROL, "actuator");
         r->csv = strstr(formats, "csv") != NULL;
         r->row = MHI_TAKE(&arena, double, widest);
         r->arena = arena;
