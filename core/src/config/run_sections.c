@@ -204,6 +204,9 @@ static const mhe_option output_options[] = {
                  "Draw estimated against reference, where gnuplot is installed."),
     MHE_OPT_TEXTS(mhi_output_section, formats, 0,
                   "Formats of the results beside .sto: csv, mat (MATLAB, all in results.mat)."),
+    MHE_OPT_ENUM(mhi_output_section, reactions, "none", "none|child|parent|ground",
+                 "What joints transmit, force and moment on the child at the joint's centre, in "
+                 "the axes of the child, of the parent or of ground (reactions.sto)."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
                 "Estimates at the start that the errors in summary.json leave out."),
     MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",
