@@ -112,8 +112,11 @@ static mhe_status follow_path(follow *f, mhe_error *err) {
         if (k == 0) {
             memcpy(s->x, estimate.q, sizeof(double) * (size_t)s->n_q);
             memcpy(s->x + s->n_q, estimate.qdot, sizeof(double) * (size_t)s->n_q);
-            status = mhi_system_equilibrium(s->context, s->x, s->x + s->n_q, estimate.activation,
-                                            s->x, err);
+            status = mhi_system_close_loops(s->context, s->x, s->x + s->n_q, err);
+            if (status == MHE_OK) {
+                status = mhi_system_equilibrium(s->context, s->x, s->x + s->n_q,
+                                                estimate.activation, s->x, err);
+            }
         }
         if (status != MHE_OK) {
             return status;

@@ -28,7 +28,7 @@
 /* Filled by the core from the option table in plugin.c. */
 struct rk_config {
     int32_t scheme; /* RK_GAUSS ...; in an instance never RK_AUTO */
-    int32_t stages; /* Gauss and Radau; 0, and in max_step: the scheme's own */
+    int32_t stages; /* Gauss and Radau; 0, and in the steps: the scheme's own */
     double max_step;
     double newton_tolerance;
     int32_t max_newton;

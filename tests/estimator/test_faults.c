@@ -146,7 +146,7 @@ static int32_t count(const outcome *o, int32_t from, int32_t to, int32_t status)
 
 static const char *const rti = "{plugin: mhe.solver.rti, preset: speed, tolerance: 1e-5}";
 static const char *const ipopt = "{plugin: mhe.solver.ipopt, max_iterations: 15}";
-static const char *const robust = "{plugin: mhe.solver.rti, tolerance: 1e-5}";
+static const char *const robust = "{plugin: mhe.solver.rti, preset: robust, tolerance: 1e-5}";
 
 /* The run without a fault; done once, kept to the end. */
 static const outcome *undisturbed(const char *solver, int ratio) {

@@ -53,3 +53,63 @@ void mhi_cholesky_solve(const double *L, int32_t n, double *B, int32_t n_columns
         scale(B + i * n_columns, L[i * n + i], n_columns);
     }
 }
+
+#define REPEATED 1e-11
+
+/* Row i of L stands in row i of A, in the columns of `order`'s places: entry (i, k) belongs to the
+ * k-th chosen row. */
+int mhi_semidefinite_factor(double *A, int32_t n, int32_t *order) {
+    double largest = 0;
+    int32_t rank = 0;
+    for (int32_t i = 0; i < n; i++) {
+        order[i] = i;
+        largest = fmax(largest, A[i * n + i]);
+        if (!isfinite(A[i * n + i])) {
+            return -1;
+        }
+    }
+    for (; rank < n; rank++) {
+        int32_t best = rank; /* the remaining diagonal stands up to date in A */
+        for (int32_t k = rank + 1; k < n; k++) {
+            best = A[order[k] * n + order[k]] > A[order[best] * n + order[best]] ? k : best;
+        }
+        const int32_t chosen = order[best];
+        const double pivot = A[chosen * n + chosen];
+        if (!(pivot > REPEATED * largest)) {
+            break;
+        }
+        order[best] = order[rank];
+        order[rank] = chosen;
+        A[chosen * n + chosen] = 1 / sqrt(pivot);
+        for (int32_t k = rank + 1; k < n; k++) {
+            A[order[k] * n + chosen] *= A[chosen * n + chosen];
+        }
+        for (int32_t k = rank + 1; k < n; k++) {
+            for (int32_t j = rank + 1; j < n; j++) {
+                A[order[k] * n + order[j]] -= A[order[k] * n + chosen] * A[order[j] * n + chosen];
+            }
+        }
+    }
+    return rank;
+}
+
+void mhi_semidefinite_solve(const double *L, int32_t n, const int32_t *order, int32_t rank,
+                            double *B, int32_t n_columns) {
+    for (int32_t i = 0; i < rank; i++) {
+        double *row = B + order[i] * n_columns;
+        for (int32_t k = 0; k < i; k++) {
+            subtract(row, B + order[k] * n_columns, L[order[i] * n + order[k]], n_columns);
+        }
+        scale(row, L[order[i] * n + order[i]], n_columns);
+    }
+    for (int32_t i = rank - 1; i >= 0; i--) {
+        double *row = B + order[i] * n_columns;
+        for (int32_t k = i + 1; k < rank; k++) {
+            subtract(row, B + order[k] * n_columns, L[order[k] * n + order[i]], n_columns);
+        }
+        scale(row, L[order[i] * n + order[i]], n_columns);
+    }
+    for (int32_t i = rank; i < n; i++) {
+        scale(B + order[i] * n_columns, 0, n_columns);
+    }
+}

@@ -11,6 +11,7 @@
 typedef struct mhi_begin {
     mhi_start *start;   /* postures from markers */
     double *q, *v;      /* known first state [n_q], NaN where free */
+    double *closed;     /* [n_q] scratch */
     double *activation; /* [n_m] of a node, guessed */
     double *near;       /* [n_q] scratch */
     double *distance;   /* [n+1] of the markers at each node */

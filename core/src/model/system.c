@@ -196,7 +196,8 @@ static mhe_status kinematics(mhi_system_context *c, const double *q, const doubl
                                 .bias = dynamics ? c->bias : NULL,
                                 .length = c->length,
                                 .length_q = c->length_q,
-                                .length_qq = derivatives ? c->length_qq : NULL};
+                                .length_qq = derivatives ? c->length_qq : NULL,
+                                .body = c->system->most_pairs > 0 ? c->body : NULL};
     return c->system->model->kinematics(c->model, q, v, &out, err);
 }
 
@@ -238,22 +239,33 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
     if (status != MHE_OK) {
         return status;
     }
+    if (s->n_c > 0) {
+        status = mhi_loops_linearise(c, out->vdot, c->tau_q, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
     muscle_derivatives(c);
     if (out->vdot_q != NULL) {
         acceleration_derivative(c, c->moment_q, c->other_q, c->tau_q, out->vdot_q);
+        mhi_loops_closed(c, MHI_LOOPS_BY_Q, out->vdot_q, n_q);
     }
     if (out->vdot_v != NULL) {
         acceleration_derivative(c, c->moment_v, c->other_v, c->tau_v, out->vdot_v);
+        mhi_loops_closed(c, MHI_LOOPS_BY_V, out->vdot_v, n_q);
     }
     if (out->vdot_a != NULL && f->n_a > 0) {
         acceleration_by_force(c, c->force_s + s->activation * n_m, NULL, n_m, out->vdot_a);
+        mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_a, n_m);
     }
     if (out->vdot_z != NULL && f->n_z > 0) {
         acceleration_by_force(c, c->force_z, f->z_muscle, f->n_z, out->vdot_z);
+        mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_z, f->n_z);
     }
     if (out->vdot_p != NULL && f->n_p > 0) {
         memcpy(out->vdot_p, c->moment_p, doubles(n_q * f->n_p));
         mhi_cholesky_solve(c->mass, n_q, out->vdot_p, f->n_p);
+        mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_p, f->n_p);
     }
     if (out->vdot_r != NULL && f->n_r > 0) {
         memset(out->vdot_r, 0, doubles(n_q * f->n_r));
@@ -261,6 +273,7 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
             out->vdot_r[i * f->n_r + i] = 1;
         }
         mhi_cholesky_solve(c->mass, n_q, out->vdot_r, f->n_r);
+        mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_r, f->n_r);
     }
     return MHE_OK;
 }
@@ -301,6 +314,12 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         out->vdot[i] += c->other[i];
     }
     mhi_cholesky_solve(c->mass, n_q, out->vdot, 1);
+    if (c->system->n_c > 0) {
+        status = mhi_loops_close(c, derivatives, out->vdot, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
     if (rates) {
         state_rates(c, out);
     }
