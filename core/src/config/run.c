@@ -257,7 +257,7 @@ static mhe_status read_costs(const struct reader *r, const mhi_node *owner, cons
 static void fill_file(const mhi_run *run, const mhe_plugin *plugin, const char *file,
                       void *config) {
     const mhi_transform_section *t = &run->transform;
-    const mhe_real_list turn = {.values = (double *)(uintptr_t)t->turn, .n = 9};
+    const mhe_real_list turn = {.values = t->turn, .n = 9};
     for (uint32_t i = 0; i < plugin->option_count; i++) {
         const mhe_option *o = &plugin->options[i];
         char *field = (char *)config + o->offset;

@@ -86,10 +86,10 @@ static const mhe_option data_options[] = {
 };
 
 static const mhe_option transform_options[] = {
-    MHE_OPT_TEXTS(
-        mhi_transform_section, rotate, 0,
-        "Turn about an axis by degrees: x-90, or [AXIS, DEGREES], where the axis is x, y, z "
-        "or [a, b, c]."),
+    MHE_OPT_TEXTS(mhi_transform_section, rotate, 0,
+                  "Turn about an axis by degrees (of markers, and of external loads in ground): "
+                  "x-90, or [AXIS, DEGREES], where the axis is x, y, z "
+                  "or [a, b, c]."),
     MHE_OPT_REALS(mhi_transform_section, shift, 0, -DBL_MAX, DBL_MAX, "m",
                   "Added afterwards, in the model's frame."),
     MHE_OPT_REAL(mhi_transform_section, scale, 1, -1e6, 1e6, "1",

@@ -77,6 +77,11 @@ static mhe_status build(mhi_reactions *r, const mhi_system_setup *setup, mhe_err
                             i < d->n_muscles ? d->muscles[i].name : "a spring");
         }
     }
+    if (d->n_loops > 0) {
+        return mhe_fail(err, MHE_E_UNSUPPORTED,
+                        "output.reactions: the model has loops, and what their joints transmit "
+                        "is not known yet");
+    }
     mhe_status status = mhi_joints_open(d, &r->arena, &r->opened, err);
     if (status == MHE_OK) {
         status = exact_paths(setup, &r->arena, &config, err);
