@@ -3,6 +3,7 @@
 #include "model/joints.h"
 
 #include "config/options_table.h"
+#include "model/actuators.h"
 #include "model/system_private.h"
 #include "plugin/instance.h"
 
@@ -133,6 +134,19 @@ static mhe_status add_loads(void *data, const mhe_load *loads, int32_t n, const 
     return r->model->loads(r->context, loads, n, values, r->given, NULL, NULL, err);
 }
 
+/* Actuators that act on bodies; one of a coordinate is part of what its joint transmits. */
+static mhe_status add_actuators(mhi_reactions *r, const double *control, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < r->system->n_actuators && status == MHE_OK; i++) {
+        const mhe_actuator *a = &r->system->description->actuators[i];
+        mhe_load loads[2];
+        double value[18];
+        const int32_t n = mhi_actuator_loads(a, a->optimal_force * control[i], loads, value);
+        status = n == 0 ? MHE_OK : add_loads(r, loads, n, value, err);
+    }
+    return status;
+}
+
 mhe_status mhi_reactions_solve(mhi_reactions *r, mhi_system_context *c, const mhe_system_point *at,
                                int32_t axes, double *out, mhe_error *err) {
     const mhe_system *face = mhi_system_face(r->system);
@@ -157,6 +171,9 @@ mhe_status mhi_reactions_solve(mhi_reactions *r, mhi_system_context *c, const mh
     }
     if (status == MHE_OK) {
         status = mhi_forces_pull(c, at, r->tension, add_loads, r, err);
+    }
+    if (status == MHE_OK && r->system->n_actuators > 0) {
+        status = add_actuators(r, at->r + r->system->n_residual, err);
     }
     for (int32_t i = 0; i < n && status == MHE_OK; i++) {
         double given = r->given[i];
