@@ -27,7 +27,8 @@ typedef struct series {
 struct results {
     mhe_estimator_info info;
     series estimates, motion, forces, markers, residuals, torques, emg, quality;
-    matlab *matlab; /* NULL: no such file */
+    matlab *matlab;             /* NULL: no such file */
+    const mhe_block *actuators; /* NULL: none are driven */
     int32_t csv;
     double *row; /* of the widest file */
     mhi_arena arena;
@@ -131,6 +132,9 @@ static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_i
     labels.n = 0;
     add_names(&labels, "moment_", f->coordinate_names, f->n_q, "");
     add_names(&labels, "residual_", f->coordinate_names, f->n_residual_torques, "");
+    if (r->actuators != NULL) {
+        add_names(&labels, "actuator_", r->actuators->entry_names, r->actuators->count, "");
+    }
     if (status == MHE_OK) {
         status =
             open_series(r, outbox, "torques", "joint moments by muscles, residual torques (N m)",
@@ -161,11 +165,15 @@ mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
                         mhe_error *err) {
     *result = NULL;
     mhi_arena arena = {0};
-    const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers + 6;
+    const mhe_block *actuators =
+        info->layout == NULL ? NULL : mhe_layout_find(info->layout, MHE_ROLE_CONTROL, "actuator");
+    const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers + 6 +
+                           (actuators == NULL ? 0 : actuators->count);
     results *r = MHI_TAKE(&arena, results, 1);
     const char **room = MHI_TAKE(&arena, const char *, widest);
     if (r != NULL) {
         r->info = *info;
+        r->actuators = actuators;
         r->csv = strstr(formats, "csv") != NULL;
         r->row = MHI_TAKE(&arena, double, widest);
         r->arena = arena;
@@ -237,7 +245,10 @@ mhe_status results_write(results *r, const mhe_estimate *e, const double *distan
     }
     if (status == MHE_OK) {
         n = put(r, 0, e->moment, f->n_q);
-        (void)put(r, n, e->residual, f->n_residual_torques);
+        n = put(r, n, e->residual, f->n_residual_torques);
+        if (r->actuators != NULL) {
+            (void)put(r, n, mhe_estimate_block(e, r->actuators), r->actuators->count);
+        }
         status = write_row(&r->torques, e->time, r->row, err);
     }
     if (status == MHE_OK) {

@@ -110,6 +110,7 @@ typedef struct mhi_horizon_section {
 
 typedef struct mhi_bounds_section {
     int32_t residual_torques;            /* 0: none; 1: one per coordinate */
+    int32_t actuators;                   /* 1: those of the model are controls */
     double residual_torque_max;          /* N m */
     mhe_text_list residual_torque_at;    /* coordinates that have one; n = 0: all */
     mhe_text_map residual_torque_limits; /* coordinate: largest magnitude, N m */

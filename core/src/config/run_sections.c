@@ -152,6 +152,9 @@ static const mhe_option horizon_options[] = {
 
 static const mhe_option bounds_options[] = {
     MHE_OPT_BOOL(mhi_bounds_section, residual_torques, 0, "Add a free torque at every coordinate."),
+    MHE_OPT_BOOL(mhi_bounds_section, actuators, 0,
+                 "Drive the model file's actuators: controls in parts of their optimal force, "
+                 "within its min_control and max_control."),
     MHE_OPT_REAL(mhi_bounds_section, residual_torque_max, 100, 0, INFINITY, "N m",
                  "Largest magnitude of a residual torque."),
     MHE_OPT_TEXTS(mhi_bounds_section, residual_torque_at, 0,

@@ -91,6 +91,7 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
                                      .muscle_config = run->muscle.config,
                                      .formulation = run->formulation,
                                      .residual_torques = run->bounds.residual_torques,
+                                     .actuators = run->bounds.actuators,
                                      .forces = forces,
                                      .n_forces = n_forces,
                                      .bounds = &bounds};

@@ -119,7 +119,8 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
     memcpy(o->v, x + e->n_q, n_q);
     memcpy(o->activation, a, n_m);
     memcpy(o->excitation, u, n_m);
-    memcpy(o->residual, o->held + e->n_m, sizeof(double) * (size_t)e->n_r);
+    memcpy(o->residual, o->held + e->n_m,
+           sizeof(double) * (size_t)mhi_ocp_problem(e->ocp)->n_residual_torques);
     mhi_muscle_state muscles;
     mhi_system_context *context = mhi_ocp_context(e->ocp);
     mhe_system_point at;

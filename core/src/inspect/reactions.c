@@ -7,6 +7,7 @@
  * the child at that frame's origin. The moments of turns in a row are about the frame's own axes,
  * because the turns stand at 0. */
 #include "inspect/inspected.h"
+#include "model/actuators.h"
 
 #include <string.h>
 
@@ -117,26 +118,13 @@ static mhe_status applied(mhi_inspected *m, const mhi_skeleton *s, const mhi_pos
     for (int32_t i = 0; i < d->n_actuators && status == MHE_OK; i++) {
         const mhe_actuator *a = &d->actuators[i];
         const double f = pose->actuator[i];
-        double value[2][9] = {{0}};
+        double value[18];
         mhe_load loads[2];
         if (a->kind == MHE_ACTUATOR_COORDINATE || f == 0) {
             continue; /* acts through the joint itself: part of what it transmits */
         }
-        for (int k = 0; k < 2; k++) {
-            loads[k] = (mhe_load){.body = a->body[k],
-                                  .axes = a->axis_in_ground ? -1 : a->body[0],
-                                  .origin = a->body[0]};
-        }
-        for (int j = 0; j < 3; j++) {
-            const int32_t at = a->kind == MHE_ACTUATOR_POINT ? j : 6 + j;
-            value[0][at] = f * a->axis[j];
-            value[1][at] = -f * a->axis[j];
-            value[0][3 + j] = a->kind == MHE_ACTUATOR_POINT ? a->point[j] : 0;
-        }
-        const int32_t pair = a->kind == MHE_ACTUATOR_TORQUE && a->body[1] >= 0;
-        const int32_t first = a->body[0] < 0;
-        status = s->ops->loads(s->context, loads + first, 1 + pair - first, value[first], tau, NULL,
-                               NULL, err);
+        const int32_t n_loads = mhi_actuator_loads(a, f, loads, value);
+        status = s->ops->loads(s->context, loads, n_loads, value, tau, NULL, NULL, err);
     }
     (void)m;
     return status;

@@ -276,6 +276,9 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
             return status;
         }
     }
+    for (int32_t i = 0; i < n_q * n_q && s->n_actuators > 0; i++) {
+        c->tau_q[i] -= c->drive_q[i];
+    }
     muscle_derivatives(c);
     solve_derivatives(c);
     if (out->vdot_q != NULL) {
@@ -300,7 +303,15 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
         mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_p, f->n_p);
     }
     if (out->vdot_r != NULL && f->n_r > 0) {
-        copy_solved(c, 2, out->vdot_r); /* n_r = n_q */
+        memset(out->vdot_r, 0, doubles(n_q * f->n_r));
+        for (int32_t i = 0; i < s->n_residual; i++) {
+            out->vdot_r[i * f->n_r + i] = 1;
+        }
+        for (int32_t i = 0; i < n_q && s->n_actuators > 0; i++) {
+            memcpy(out->vdot_r + i * f->n_r + s->n_residual, c->drive_r + i * s->n_actuators,
+                   doubles(s->n_actuators));
+        }
+        mhi_cholesky_solve(c->mass, n_q, out->vdot_r, f->n_r);
         mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_r, f->n_r);
     }
     return MHE_OK;
@@ -329,6 +340,9 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
         status = mhi_forces_evaluate(c, at, derivatives, err);
     }
+    if (status == MHE_OK && c->system->n_actuators > 0) {
+        status = mhi_actuators_drive(c, at->q, at->r + c->system->n_residual, derivatives, err);
+    }
     if (status != MHE_OK) {
         return status;
     }
@@ -336,10 +350,13 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         return mhe_fail(err, MHE_RETRY, "the mass matrix is singular at this posture");
     }
     for (int32_t i = 0; i < n_q; i++) {
-        out->vdot[i] = c->moment[i] - c->bias[i] + (face->n_r > 0 ? at->r[i] : 0.0);
+        out->vdot[i] = c->moment[i] - c->bias[i] + (c->system->n_residual > 0 ? at->r[i] : 0.0);
     }
     for (int32_t i = 0; i < n_q && c->system->n_forces > 0; i++) {
         out->vdot[i] += c->other[i];
+    }
+    for (int32_t i = 0; i < n_q && c->system->n_actuators > 0; i++) {
+        out->vdot[i] += c->drive[i];
     }
     mhi_cholesky_solve(c->mass, n_q, out->vdot, 1);
     if (c->system->n_c > 0) {
