@@ -72,6 +72,7 @@ struct mhi_system_context {
     double *push, *push_d, *push_w;         /* [most_pairs x 6], [most_pairs x 6 x 6] */
     double *pair_rows, *pair_loads;         /* [most_pairs x 6 x n_q], [n_q x 36] */
     double *pair_q, *pair_work, *pair_turn; /* [n_q x n_q], [18 x n_q], [3 x n_q] */
+    double *solved;                         /* [n_q x 3 n_q] vdot by q, by v, by torques */
     double *row_q, *row_v;                  /* [n_q] */
     double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
     double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */
