@@ -14,7 +14,7 @@ const char *const results_names[] = {
     "torques.sto",   "torques.csv",   "markers.trc",  "markers.csv", "marker_residuals.sto",
     "emg.sto",       "emg.csv",       "quality.sto",  "quality.csv", "marker_residuals.csv",
     "results.mat",   "config.yaml",   "summary.json", "report.html", "estimates.gp",
-    "estimates.svg"};
+    "estimates.svg", "reactions.sto", "reactions.csv"};
 const int32_t results_n_names = (int32_t)(sizeof results_names / sizeof results_names[0]);
 
 /* One table in all its formats. */
@@ -26,7 +26,7 @@ typedef struct series {
 
 struct results {
     mhe_estimator_info info;
-    series estimates, motion, forces, markers, residuals, torques, emg, quality;
+    series estimates, motion, forces, markers, residuals, torques, emg, quality, reactions;
     matlab *matlab;             /* NULL: no such file */
     const mhe_block *actuators; /* NULL: none are driven */
     int32_t csv;
@@ -141,6 +141,16 @@ static mhe_status open_markers(results *r, mhe_outbox *outbox, const mhe_recordi
     return status == MHE_OK ? open_others(r, outbox, "markers", labels, &r->markers, err) : status;
 }
 
+static mhe_status open_reactions(results *r, mhe_outbox *outbox, names *labels, mhe_error *err) {
+    static const char *const parts[] = {"_fx", "_fy", "_fz", "_mx", "_my", "_mz"};
+    labels->n = 0;
+    for (int32_t i = 0; i < 6 * r->info.n_joints; i++) {
+        add_names(labels, "", &r->info.joint_names[i / 6], 1, parts[i % 6]);
+    }
+    return open_series(r, outbox, "reactions", "what joints transmit (N, N m)", labels,
+                       &r->reactions, err);
+}
+
 static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_info *recording,
                            const char **room, mhe_error *err) {
     static const char *quality[] = {"status",   "iterations", "kkt_residual",
@@ -178,6 +188,9 @@ static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_i
     if (status == MHE_OK) {
         status = open_series(r, outbox, "emg", "EMG that was tracked", &labels, &r->emg, err);
     }
+    if (status == MHE_OK && f->n_joints > 0) {
+        status = open_reactions(r, outbox, &labels, err);
+    }
     const names of_quality = {.owner = r, .list = quality, .n = 6};
     return status == MHE_OK ? open_series(r, outbox, "quality", "quality of each estimate",
                                           &of_quality, &r->quality, err)
@@ -190,7 +203,7 @@ mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
     *result = NULL;
     mhi_arena arena = {0};
     const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers +
-                           info->layout->n_x + info->layout->n_u + 6;
+                           6 * info->n_joints + info->layout->n_x + info->layout->n_u + 6;
     results *r = MHI_TAKE(&arena, results, 1);
     const char **room = MHI_TAKE(&arena, const char *, widest);
     if (r != NULL) {
@@ -278,6 +291,9 @@ mhe_status results_write(results *r, const mhe_estimate *e, const double *distan
             (void)put(r, n, mhe_estimate_block(e, r->actuators), r->actuators->count);
         }
         status = write_row(&r->torques, e->time, r->row, err);
+    }
+    if (status == MHE_OK && e->reactions != NULL) {
+        status = write_row(&r->reactions, e->time, e->reactions, err);
     }
     if (status == MHE_OK) {
         const double quality[] = {e->status,           e->iterations, e->kkt_residual,
