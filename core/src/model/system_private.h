@@ -144,6 +144,12 @@ void mhi_loops_closed(const mhi_system_context *c, int32_t by, double *columns, 
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
  * in other_q, other_v. Needs the kinematics of `at` in the context. */
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+/* Tensions of the force plugins' paths, added to `tension` [n_paths], and each plugin's loads.
+ * Needs the kinematics of `at` in the context. */
+typedef mhe_status mhi_force_loads(void *data, const mhe_load *loads, int32_t n,
+                                   const double *values, mhe_error *err);
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
+                           mhi_force_loads *loads, void *data, mhe_error *err);
 /* Each is finite at the model's default posture; once the system is whole. */
 mhe_status mhi_forces_check(mhi_system *s, mhe_error *err);
 void mhi_forces_destroy(mhi_system *s);
