@@ -207,6 +207,9 @@ static void add_row(const double *row, int32_t first, int32_t n, double r, doubl
     for (int32_t a = 0; a < n; a++) {
         const double scaled = scale * row[a];
         double *hessian = sum->hessian + (first + a) * n_z + first;
+        if (scaled == 0) { /* a marker moves with few coordinates */
+            continue;
+        }
         sum->gradient[first + a] += scaled * r;
         for (int32_t b = 0; b <= a; b++) {
             hessian[b] += scaled * row[b];
