@@ -181,6 +181,7 @@ static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
         axes = axes[i] == NULL ? NULL : axes;
     }
     const char **loops = name_loops(ocp);
+    const mhe_block *drive = mhe_layout_find(p->layout, MHE_ROLE_CONTROL, "actuator");
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         const int32_t of_muscles = i == MHI_SIGNAL_ACTIVATION || i == MHI_SIGNAL_EXCITATION ||
                                    i == MHI_SIGNAL_MUSCLE_FORCE;
@@ -188,7 +189,9 @@ static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
         ocp->entry_names[i] = i == MHI_SIGNAL_MARKERS ? axes
                               : of_muscles            ? p->muscle_names
                               : of_loops              ? loops
-                                                      : p->coordinate_names;
+                              : i == MHI_SIGNAL_ACTUATOR
+                                  ? (drive != NULL ? drive->entry_names : NULL)
+                                  : p->coordinate_names;
     }
     return axes == NULL || loops == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
 }
@@ -201,7 +204,7 @@ static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_erro
                        .n_q = d->n_coordinates,
                        .n_muscles = d->n_muscles,
                        .n_markers = d->n_markers,
-                       .n_residual_torques = mhi_system_face(setup->system)->n_r,
+                       .n_residual_torques = ocp->signals.signal[MHI_SIGNAL_RESIDUAL_TORQUE].n_y,
                        .n_intervals = setup->n_intervals,
                        .interval = setup->interval,
                        .data = ocp,
