@@ -19,7 +19,7 @@ static void *open_beside(const char *folder_of, const char *name) {
 static const char here_i_am[] = "source";
 
 static void *open_any(const char *path) {
-    static const char *const system[] = {"liblsl.so.2", "liblsl.so"};
+    static const char *const system[] = {"liblsl.so.2", "liblsl.so", "liblsl64.so"};
     if (path != NULL) {
         return dlopen(path, RTLD_NOW | RTLD_LOCAL);
     }
@@ -38,11 +38,13 @@ mhe_status lsl_load(const char *path, lsl_library *out, mhe_error *err) {
     void *library = open_any(path);
     if (library == NULL) {
         const char *why = dlerror();
-        return mhe_fail(
-            err, MHE_E_IO,
-            "Lab Streaming Layer needs liblsl, which is not there (%s): install it, or name its "
-            "file by 'library'",
-            why == NULL ? "no reason given" : why);
+        return path == NULL
+                   ? mhe_fail(err, MHE_E_IO,
+                              "Lab Streaming Layer needs liblsl, which is not there: run "
+                              "vendor/take (as ./bootstrap does) and configure again, or install "
+                              "it, or name its file by 'library'")
+                   : mhe_fail(err, MHE_E_IO, "library: liblsl cannot be loaded: %s",
+                              why == NULL ? path : why);
     }
     const char *missing = NULL;
 #define LSL_TAKE(name, result, arguments)                  \
@@ -56,6 +58,6 @@ mhe_status lsl_load(const char *path, lsl_library *out, mhe_error *err) {
     return missing == NULL ? MHE_OK
                            : mhe_fail(err, MHE_E_IO,
                                       "liblsl lacks the function %s: is it older "
-                                      "than 1.0?",
+                                      "than 1.10?",
                                       missing);
 }

@@ -2,7 +2,7 @@
 /* lsl_library.h: Lab Streaming Layer's library, loaded when it is needed. Shared by the plugins
  * that speak it.
  *
- * The functions are those of liblsl's C interface, unchanged since version 1.0 (Kothe et al.,
+ * The functions are those of liblsl's C interface, unchanged since version 1.10 (Kothe et al.,
  * labstreaminglayer.org; MIT licence). Where the system has none, the one that lies beside the
  * plugins is taken. */
 #ifndef LSL_LIBRARY_H
@@ -14,6 +14,7 @@ typedef struct lsl_streaminfo_struct_ *lsl_streaminfo;
 typedef struct lsl_inlet_struct_ *lsl_inlet;
 typedef struct lsl_outlet_struct_ *lsl_outlet;
 typedef struct lsl_xml_ptr_struct_ *lsl_xml_ptr;
+typedef struct lsl_continuous_resolver_ *lsl_continuous_resolver;
 
 enum { lsl_float32 = 1, lsl_double64, lsl_string, lsl_int32, lsl_int16, lsl_int8, lsl_int64 };
 enum { lsl_no_error = 0, lsl_timeout_error = -1, lsl_lost_error = -2 };
@@ -23,9 +24,11 @@ enum { lsl_no_error = 0, lsl_timeout_error = -1, lsl_lost_error = -2 };
 #define LSL_FUNCTIONS(X)                                                                        \
     X(library_version, int32_t, (void))                                                         \
     X(local_clock, double, (void))                                                              \
-    X(resolve_bypred, int32_t,                                                                  \
-      (lsl_streaminfo * found, uint32_t room, const char *predicate, int32_t least,             \
-       double timeout))                                                                         \
+    X(create_continuous_resolver_bypred, lsl_continuous_resolver,                               \
+      (const char *predicate, double forget_after))                                             \
+    X(resolver_results, int32_t,                                                                \
+      (lsl_continuous_resolver resolver, lsl_streaminfo * found, uint32_t room))                \
+    X(destroy_continuous_resolver, void, (lsl_continuous_resolver resolver))                    \
     X(create_inlet, lsl_inlet,                                                                  \
       (lsl_streaminfo info, int32_t seconds, int32_t chunk, int32_t recover))                   \
     X(destroy_inlet, void, (lsl_inlet inlet))                                                   \
@@ -42,6 +45,7 @@ enum { lsl_no_error = 0, lsl_timeout_error = -1, lsl_lost_error = -2 };
     X(get_name, const char *, (lsl_streaminfo info))                                            \
     X(get_type, const char *, (lsl_streaminfo info))                                            \
     X(get_uid, const char *, (lsl_streaminfo info))                                             \
+    X(get_hostname, const char *, (lsl_streaminfo info))                                        \
     X(get_channel_count, int32_t, (lsl_streaminfo info))                                        \
     X(get_nominal_srate, double, (lsl_streaminfo info))                                         \
     X(get_channel_format, int32_t, (lsl_streaminfo info))                                       \
@@ -63,9 +67,9 @@ typedef struct lsl_library {
 #undef LSL_FIELD
 } lsl_library;
 
-/* Loads `path`, or where it is NULL the first there is of liblsl.so.2, liblsl.so (the system's) and
- * liblsl64.so beside this plugin. Once loaded it stays. MHE_E_IO: none, with where it was looked
- * for. [cold] */
+/* Loads `path`, or where it is NULL the first there is of liblsl.so.2, liblsl.so, liblsl64.so (the
+ * system's) and lib/liblsl64.so beside this plugin. Once loaded it stays. MHE_E_IO: none, with
+ * where it was looked for. [cold] */
 mhe_status lsl_load(const char *path, lsl_library *out, mhe_error *err);
 
 #endif

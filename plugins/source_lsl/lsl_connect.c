@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* lsl_connect.c: finds a stream on the network and reads what it says of itself. */
+/* lsl_connect.c: opens a stream and reads what it says of itself. */
 #include "source_lsl.h"
 
 #include <math.h>
@@ -7,10 +7,8 @@
 #include <string.h>
 
 #define MOST_CHANNELS 4096
-#define MOST_FOUND 16
 #define PULL 512   /* samples at once */
 #define ANSWER 2.0 /* s that a sender may take to describe itself, and to connect */
-#define SEARCH 2.0 /* s: less, and the waves of the library's search have not all gone out */
 
 static char *copy(const char *text) {
     char *out = strdup(text == NULL ? "" : text);
@@ -37,7 +35,10 @@ void lsl_disconnect(lsl_source *source, lsl_stream *s) {
     free(s->uid);
     free(s->values);
     free(s->stamps);
-    *s = (lsl_stream){.predicate = s->predicate, .kind = s->kind};
+    lsl_stream fresh = {
+        .predicate = s->predicate, .kind = s->kind, .search = s->search, .found = s->found};
+    (void)snprintf(fresh.refused, sizeof fresh.refused, "%s", s->refused);
+    *s = fresh;
 }
 
 /* Markers: the label without its axis, and the axis as ".x": "STER.x". Senders write types
@@ -121,44 +122,14 @@ static mhe_status read_info(lsl_source *source, lsl_stream *s, lsl_streaminfo in
     return read_channels(source, s, info, err);
 }
 
-static double left(double deadline) {
-    const double seconds = deadline - lsl_now();
-    return seconds > 0.01 ? seconds : 0.01;
-}
-
-/* The one stream that the predicate names. */
-static mhe_status find(lsl_source *source, const lsl_stream *s, double deadline,
-                       lsl_streaminfo *out, mhe_error *err) {
-    lsl_streaminfo found[MOST_FOUND];
+mhe_status lsl_connect(lsl_source *source, lsl_stream *s, lsl_streaminfo info, double clock,
+                       mhe_error *err) {
     const lsl_library *l = &source->lsl;
-    const double seconds = fmax(left(deadline), SEARCH);
-    const int32_t n = l->resolve_bypred(found, MOST_FOUND, s->predicate, 1, seconds);
-    mhe_status status = MHE_OK;
-    if (n < 1) {
-        status = mhe_fail(err, MHE_RETRY, "no stream with %s", s->predicate);
-    } else if (n > 1) {
-        status = mhe_fail(
-            err, MHE_RETRY, "%d streams with %s ('%.60s', '%.60s'): name one, as in name='%.60s'",
-            n, s->predicate, l->get_name(found[0]), l->get_name(found[1]), l->get_name(found[0]));
-    }
-    for (int32_t i = status == MHE_OK ? 1 : 0; i < n; i++) {
-        l->destroy_streaminfo(found[i]);
-    }
-    *out = status == MHE_OK ? found[0] : NULL;
-    return status;
-}
-
-mhe_status lsl_connect(lsl_source *source, lsl_stream *s, double deadline, mhe_error *err) {
-    const lsl_library *l = &source->lsl;
-    lsl_streaminfo info = NULL;
     int32_t code = 0;
-    mhe_status status = find(source, s, deadline, &info, err);
-    if (status != MHE_OK) {
-        return status;
-    }
     lsl_streaminfo whole = NULL;
-    s->inlet = l->create_inlet(info, (int32_t)ceil(source->config.buffer), 0, 1);
-    l->destroy_streaminfo(info);
+    mhe_status status = MHE_OK;
+    /* The library's own way to find a sender again passes over other labels: it is not used. */
+    s->inlet = l->create_inlet(info, (int32_t)ceil(source->config.buffer), 0, 0);
     if (s->inlet != NULL) {
         whole = l->get_fullinfo(s->inlet, ANSWER, &code);
     }
@@ -180,7 +151,7 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, double deadline, mhe_e
     }
     /* The first measurement of its clock takes packets to and fro; later ones are made behind the
      * scenes, and asking for them does not wait. */
-    const double offset = l->time_correction(s->inlet, ANSWER, &code);
+    const double offset = l->time_correction(s->inlet, clock, &code);
     s->has_offset = code == lsl_no_error && isfinite(offset);
     s->offset = s->has_offset ? offset : 0;
     s->newest = s->asked = lsl_now();

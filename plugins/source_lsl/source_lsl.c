@@ -9,7 +9,10 @@
 
 #define QUIET 1.0       /* s without a sample of a regular stream: told as lost */
 #define CLOCK_EVERY 2.0 /* s between two looks at a sender's clock */
-#define WAIT 0.001      /* s of one pull */
+#define CLOCK_FIRST 2.0 /* s that the first look may take */
+#define LOOK_EVERY 0.1  /* s between two looks at a search */
+#define WAIT 0.0003     /* s between two looks where nothing is there */
+#define MOST_PULLS 64   /* of one stream in a row */
 
 double lsl_now(void) {
     struct timespec t;
@@ -20,6 +23,7 @@ double lsl_now(void) {
 static void lsl_source_destroy(void *self) {
     lsl_source *source = self;
     for (int32_t i = 0; i < source->n_streams; i++) {
+        lsl_end_search(source, &source->streams[i]);
         lsl_disconnect(source, &source->streams[i]);
     }
     free(source->streams);
@@ -64,19 +68,52 @@ static mhe_status lsl_source_create(const mhe_host *host, const void *config, vo
     return MHE_OK;
 }
 
-static mhe_status lsl_source_open(void *self, double deadline, mhe_error *err) {
-    lsl_source *source = self;
+static void rest(double seconds) {
+    const struct timespec t = {0, (long)(1e9 * seconds)};
+    (void)nanosleep(&t, NULL);
+}
+
+/* Looks for all streams at once; the first that is still missing is told. */
+static mhe_status open_missing(lsl_source *source, mhe_error *err) {
     mhe_status first = MHE_OK;
     for (int32_t i = 0; i < source->n_streams; i++) {
         mhe_error why = {0};
         lsl_stream *s = &source->streams[i];
-        const mhe_status status =
-            s->inlet != NULL ? MHE_OK : lsl_connect(source, s, deadline, &why);
-        if (status != MHE_OK && (first == MHE_OK || status < first)) {
+        lsl_streaminfo info = NULL;
+        mhe_status status = s->inlet != NULL ? MHE_OK : lsl_look(source, s, &info, &why);
+        if (info != NULL) {
+            status = lsl_connect(source, s, info, CLOCK_FIRST, &why);
+            source->lsl.destroy_streaminfo(info);
+        }
+        if (status == MHE_OK) {
+            lsl_end_search(source, s);
+        } else if (first == MHE_OK || status < first) {
             first = mhe_fail(err, status, "%s", why.text);
         }
     }
     return first;
+}
+
+/* What came while the others were connected belongs to no run. */
+static mhe_status drop_backlog(lsl_source *source) {
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        lsl_stream *s = &source->streams[i];
+        const unsigned long most = s->room * (unsigned long)s->n_channels;
+        int32_t code = 0;
+        while (source->lsl.pull_chunk_d(s->inlet, s->values, s->stamps, most, s->room, 0, &code) >
+               0) {
+        }
+    }
+    return MHE_OK;
+}
+
+static mhe_status lsl_source_open(void *self, double deadline, mhe_error *err) {
+    mhe_status status = open_missing(self, err);
+    while (status == MHE_RETRY && lsl_now() < deadline) {
+        rest(LOOK_EVERY / 2);
+        status = open_missing(self, err);
+    }
+    return status == MHE_OK ? drop_backlog(self) : status;
 }
 
 static int32_t lsl_source_count(const void *self) {
@@ -109,12 +146,14 @@ static void tell(const mhe_source_taker *taker, int32_t event, int32_t i, const 
 }
 
 /* Samples that are there, at most one pull; returns how many. */
-static int32_t pull(lsl_source *source, int32_t i, double wait, const mhe_source_taker *taker) {
+static int32_t pull(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
     lsl_stream *s = &source->streams[i];
     int32_t code = 0;
-    const unsigned long elements =
-        source->lsl.pull_chunk_d(s->inlet, s->values, s->stamps,
-                                 s->room * (unsigned long)s->n_channels, s->room, wait, &code);
+    if (s->inlet == NULL) {
+        return 0;
+    }
+    const unsigned long elements = source->lsl.pull_chunk_d(
+        s->inlet, s->values, s->stamps, s->room * (unsigned long)s->n_channels, s->room, 0, &code);
     const int32_t n = (int32_t)(elements / (unsigned long)s->n_channels);
     if (n > 0) {
         const mhe_chunk chunk = {.size = sizeof chunk,
@@ -126,34 +165,116 @@ static int32_t pull(lsl_source *source, int32_t i, double wait, const mhe_source
         s->newest = chunk.received;
         if (s->lost) {
             s->lost = 0;
+            lsl_end_search(source, s);
             tell(taker, MHE_SOURCE_BACK, i, s, "is back");
         }
         taker->chunk(taker->data, &chunk);
+    } else if (code == lsl_lost_error) {
+        source->lsl.destroy_inlet(s->inlet);
+        s->inlet = NULL;
     }
     return n;
 }
 
-/* The library itself finds a sender again that has the same source id. */
-static void watch(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
+static int same_texts(char **a, char **b, int32_t n) {
+    for (int32_t k = 0; k < n; k++) {
+        if (strcmp(a[k], b[k]) != 0) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static int is_same(const lsl_stream *a, const lsl_stream *b) {
+    return a->n_channels == b->n_channels && a->rate == b->rate &&
+           same_texts(a->labels, b->labels, a->n_channels) &&
+           same_texts(a->units, b->units, a->n_channels);
+}
+
+/* A sender that is of no use is told once. */
+static void refuse(lsl_source *source, int32_t i, lsl_streaminfo info, const char *why,
+                   const mhe_source_taker *taker) {
     lsl_stream *s = &source->streams[i];
-    if (!s->lost && s->rate > 0 && lsl_now() - s->newest > QUIET) {
-        s->lost = 1;
-        tell(taker, MHE_SOURCE_LOST, i, s, "sends nothing any more");
+    const char *uid = source->lsl.get_uid(info);
+    if (strncmp(s->refused, uid, sizeof s->refused - 1) != 0) {
+        (void)snprintf(s->refused, sizeof s->refused, "%s", uid);
+        taker->event(taker->data, MHE_SOURCE_WARNING, i, why);
     }
 }
 
+/* The stream is there again: as it was, or another under its name. */
+static void replace(lsl_source *source, int32_t i, lsl_streaminfo info,
+                    const mhe_source_taker *taker) {
+    lsl_stream *s = &source->streams[i];
+    lsl_stream fresh = {.predicate = s->predicate, .kind = s->kind};
+    mhe_error why = {0};
+    if (lsl_connect(source, &fresh, info, 0, &why) != MHE_OK) {
+        refuse(source, i, info, why.text, taker);
+        return;
+    }
+    const int same = is_same(s, &fresh);
+    lsl_end_search(source, s);
+    lsl_disconnect(source, s);
+    *s = fresh;
+    tell(taker, same ? MHE_SOURCE_BACK : MHE_SOURCE_CHANGED, i, s,
+         same ? "is back" : "is back with other channels, units or another rate");
+}
+
+/* What sends nothing any more is told, and looked for. */
+static void watch(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
+    lsl_stream *s = &source->streams[i];
+    const double now = lsl_now();
+    const int quiet = s->rate > 0 && now - s->newest > QUIET;
+    if (!s->lost && (quiet || s->inlet == NULL)) {
+        s->lost = 1;
+        s->looked = 0;
+        tell(taker, MHE_SOURCE_LOST, i, s, "sends nothing any more");
+    }
+    if (s->lost && now - s->looked > LOOK_EVERY) {
+        lsl_streaminfo info = NULL;
+        mhe_error why = {0};
+        s->looked = now;
+        (void)lsl_look(source, s, &info, &why);
+        if (info != NULL && (s->inlet == NULL || strcmp(source->lsl.get_uid(info), s->uid) != 0)) {
+            replace(source, i, info, taker);
+        }
+        if (info != NULL) {
+            source->lsl.destroy_streaminfo(info);
+        }
+    }
+}
+
+/* All that is there of the streams that make frames, or of all others. */
+static int32_t drain(lsl_source *source, int markers, const mhe_source_taker *taker) {
+    int32_t total = 0;
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        int32_t n = 0;
+        for (int k = 0;
+             k < MOST_PULLS && markers == (source->streams[i].kind == MHE_STREAM_MARKERS); k++) {
+            n = pull(source, i, taker);
+            total += n;
+            if ((unsigned long)n < source->streams[i].room) {
+                break;
+            }
+        }
+    }
+    return total;
+}
+
+/* Frames come last: what was measured by then is there already. */
 static mhe_status lsl_source_read(void *self, double deadline, const mhe_source_taker *taker,
                                   mhe_error *err) {
     (void)err;
     lsl_source *source = self;
     int32_t n = 0;
     do {
+        n = drain(source, 0, taker);
+        n += drain(source, 1, taker);
         for (int32_t i = 0; i < source->n_streams; i++) {
-            /* the first stream waits for all: pulls with a timeout return as soon as one sample is
-             * there */
-            const double wait = n == 0 && i == 0 ? WAIT : 0;
-            n += pull(source, i, wait, taker);
             watch(source, i, taker);
+        }
+        if (n == 0) {
+            rest(WAIT);
         }
     } while (n == 0 && lsl_now() < deadline);
     return MHE_OK;
@@ -164,7 +285,7 @@ static mhe_status lsl_source_clock_offset(void *self, int32_t i, double *offset,
     lsl_stream *s = &source->streams[i];
     const double now = lsl_now();
     int32_t code = 0;
-    if (s->inlet != NULL && now - s->asked > CLOCK_EVERY) {
+    if (s->inlet != NULL && now - s->asked > (s->has_offset ? CLOCK_EVERY : LOOK_EVERY)) {
         const double measured = source->lsl.time_correction(s->inlet, 0.0, &code);
         s->asked = now;
         if (code == lsl_no_error && isfinite(measured)) {

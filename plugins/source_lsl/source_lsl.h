@@ -16,13 +16,17 @@ struct lsl_config { /* filled by the core from the option table */
 /* One stream: what was asked for, and what was found. */
 typedef struct lsl_stream {
     const char *predicate;
-    int32_t kind;    /* MHE_STREAM_* */
-    lsl_inlet inlet; /* NULL: not found yet */
+    int32_t kind;                   /* MHE_STREAM_* */
+    lsl_inlet inlet;                /* NULL: not found yet, or lost */
+    lsl_continuous_resolver search; /* while it is looked for */
+    double found;                   /* s, when the search had something first; 0: nothing yet */
+    char refused[40];               /* uid of a sender that was told to be no use */
     int32_t n_channels, format;
     double rate;
     char *name, *uid;
     char **labels, **units;
     int32_t lost;
+    double looked; /* s, when a lost one was looked for last */
     double offset; /* s, lsl_time_correction of the inlet */
     double asked;  /* s, when it was asked for last */
     int32_t has_offset;
@@ -42,9 +46,19 @@ typedef struct lsl_source {
 
 double lsl_now(void); /* s of CLOCK_MONOTONIC */
 
-/* lsl_connect.c: looks for the stream until `deadline`; MHE_RETRY: not there, or not the only one.
+/* lsl_search.c: the one stream that the predicate names, looked for behind the scenes. MHE_OK:
+ * *info is it, the caller's. MHE_RETRY: not there yet, or not the only one; err says which. Does
+ * not wait.
  */
-mhe_status lsl_connect(lsl_source *source, lsl_stream *stream, double deadline, mhe_error *err);
+mhe_status lsl_look(lsl_source *source, lsl_stream *stream, lsl_streaminfo *info, mhe_error *err);
+void lsl_end_search(lsl_source *source, lsl_stream *stream);
+
+/* lsl_connect.c: opens an inlet to what was found, and reads what it says of itself; `stream` has
+ * its predicate and kind and nothing else yet. `clock`: s that its clock may take to be measured;
+ * it is measured behind the scenes then. MHE_RETRY: it does not answer; MHE_E_INPUT: its samples
+ * are no numbers. */
+mhe_status lsl_connect(lsl_source *source, lsl_stream *stream, lsl_streaminfo info, double clock,
+                       mhe_error *err);
 void lsl_disconnect(lsl_source *source, lsl_stream *stream);
 
 #endif

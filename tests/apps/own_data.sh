@@ -6,14 +6,16 @@
 set -u
 run=$1
 readme=$2/README.md
+raw_page=$2/docs/raw-emg.md
 demo=$2/models/arm19
 . "$(dirname "$0")/../support/script.sh"
 
-# block 'LINE BEFORE': the indented block that follows it in the README, without its indent
+# block LINE [PAGE]: the indented block that follows the line in the README (the page), without its indent
 block() {
+    page=${2:-$readme}
     awk -v before="$1" 'index($0, before) {found = 1; next}
         found && /^ *$/ {if (n) exit; next}
-        found {n++; match($0, /^ */); indent = n == 1 ? RLENGTH : indent; print substr($0, indent + 1)}' "$readme"
+        found {n++; match($0, /^ */); indent = n == 1 ? RLENGTH : indent; print substr($0, indent + 1)}' "$page"
 }
 
 # estimate CONFIG: --check, then the run; all windows answered, markers within 5 mm
@@ -45,7 +47,7 @@ estimate some
 # Raw EMG: its block is for another arm's muscles.
 {
     grep '^model:\|^horizon:' my.yaml
-    block 'the data stay as recorded:' | sed -e 's/trial.trc/trial.c3d/;s/raw.sto/trial.c3d/' \
+    block 'the data stay as recorded:' "$raw_page" | sed -e 's/trial.trc/trial.c3d/;s/raw.sto/trial.c3d/' \
         -e 's/DELTmed/Deltoid2/;s/bic_l, bic_b/BicepsLong, BicepsShort/'
     echo 'costs: [{plugin: mhe.cost.emg-markers-high, tracked: [Deltoid2, BicepsLong, BicepsShort]}]'
 } > raw.yaml

@@ -1,7 +1,7 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
 # The shipped recording with raw EMG, whose truth is known: what the log names, and errors beside those of the same run
-# without filters. The bounds are what was measured (in README.md) and a tenth more; without EMG errors 'at least' too.
+# without filters. The bounds are what was measured (in docs/raw-emg.md) and a tenth more; without EMG errors 'at least' too.
 #   raw.sh BIN_DIR SOURCE_DIR
 set -u
 bin=$1

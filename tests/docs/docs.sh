@@ -1,6 +1,6 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# Parts of the README files that are made from the program and from compiled files. Fails where one is stale.
+# Parts of the README files and of docs/ that are made from the program and from compiled files. Fails where one is stale.
 #   docs.sh check|update PATH/mhe-run SOURCE_DIR
 #
 # Between "<!-- options ID -->" and "<!-- /options -->": what --describe ID says. Between "<!-- file: PATH -->" and
@@ -39,7 +39,7 @@ fresh() {
 }
 
 stale=0
-for readme in README.md plugins/*/README.md; do
+for readme in README.md docs/*.md plugins/*/README.md; do
     fresh "$readme" > "$work/fresh.md"
     if cmp -s "$readme" "$work/fresh.md"; then
         continue

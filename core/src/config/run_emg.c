@@ -36,7 +36,8 @@ static mhe_status check_section(const mhi_run *run, const mhi_node *section, mhe
                            "emg: 'band_low' is %g Hz, which is not below 'band_high', %g Hz",
                            e->band_low, e->band_high);
     }
-    if (run->data.emg == NULL) {
+    const mhi_node *sources = mhi_node_find(mhi_tree_root(run->tree), "sources");
+    if (run->data.emg == NULL && (sources == NULL || sources->first == NULL)) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, section,
                            "emg: there are channels, but data.emg names no file");
     }

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #define WAITING 256 /* frames that may wait for their EMG; more are no longer in any window */
+#define SETTLE 1.0  /* s that the first frame waits for envelopes at most */
 #define FORGET 1e-6 /* s a sample by which the guess of a clock gives way: it may drift */
 
 mhe_status mhi_feed_open(mhi_feed *f, const mhe_host *host, const mhi_run *run,
@@ -15,6 +16,7 @@ mhe_status mhi_feed_open(mhi_feed *f, const mhe_host *host, const mhi_run *run,
                     .sources = run->sources.uses,
                     .n_sources = run->sources.n,
                     .driver = -1,
+                    .begun = NAN,
                     .last = -INFINITY};
     mhe_status status = mhe_estimator_describe(estimator, &f->info);
     f->setup = (mhi_inlet_setup){host, run, model, &f->info};
@@ -118,9 +120,10 @@ static void keep_waiting(mhi_feed *f, double time) {
 
 static mhe_status serve_waiting(mhi_feed *f, mhi_inlet *in, mhe_error *err) {
     mhe_status status = MHE_OK;
-    while (f->n_waiting > 0 && f->waiting[f->first_waiting] <= in->newest && status == MHE_OK) {
+    while (f->n_waiting > 0 && f->start + f->waiting[f->first_waiting] <= in->newest &&
+           status == MHE_OK) {
         const double time = f->waiting[f->first_waiting];
-        mhi_electrodes_at(in->electrodes, time, in->row);
+        mhi_electrodes_at(in->electrodes, f->start + time, in->row);
         status = mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
         f->first_waiting = (f->first_waiting + 1) % WAITING;
         f->n_waiting--;
@@ -133,8 +136,8 @@ static void add_electrodes(mhi_feed *f, double time) {
     for (int32_t i = 0; i < f->n_inlets; i++) {
         mhi_inlet *in = &f->inlets[i];
         if (in->is_raw && in->channel >= 0) {
-            if (in->newest >= time) {
-                mhi_electrodes_at(in->electrodes, time, in->row);
+            if (in->newest >= f->start + time) {
+                mhi_electrodes_at(in->electrodes, f->start + time, in->row);
                 f->channels[in->channel] = in->row;
             } else {
                 keep_waiting(f, time);
@@ -182,24 +185,45 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, mhe_error 
     return MHE_OK;
 }
 
+/* Envelopes take a while to begin; the first frame waits for them, SETTLE at most. */
+static int32_t is_settled(mhi_feed *f, double host_time) {
+    if (!isfinite(f->begun)) {
+        f->begun = host_time;
+    }
+    for (int32_t i = 0; i < f->n_inlets && host_time - f->begun < SETTLE; i++) {
+        mhi_inlet *in = &f->inlets[i];
+        int32_t any = !in->is_raw || in->channel < 0;
+        if (!any && isfinite(in->newest)) {
+            mhi_electrodes_at(in->electrodes, in->newest, in->row);
+            for (int32_t k = 0; k < in->width && !any; k++) {
+                any = isfinite(in->row[k]);
+            }
+        }
+        if (!any) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
 static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, const double *values,
                               mhe_error *err) {
     const int32_t is_driver = in == &f->inlets[f->driver];
     const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
-    if (f->n_frames == 0 && is_driver) {
-        f->start = smooth;
-    }
-    if (f->n_frames == 0 && !is_driver) {
-        in->newest = -INFINITY; /* before the first frame there is no time to give it */
+    in->newest = smooth;
+    if (in->is_raw) { /* on the host's time: there may be no frame yet */
+        in->n_samples++;
+        mhi_electrodes_push(in->electrodes, smooth, values);
         return MHE_OK;
+    }
+    if (f->n_frames == 0 && (!is_driver || !is_settled(f, smooth))) {
+        return MHE_OK; /* before the first frame there is no time to give it */
+    }
+    if (f->n_frames == 0) {
+        f->start = smooth;
     }
     const double time = smooth - f->start;
     in->n_samples++;
-    in->newest = time;
-    if (in->is_raw) {
-        mhi_electrodes_push(in->electrodes, time, values);
-        return MHE_OK;
-    }
     mhi_inlet_take(in, f->setup.run, values);
     return is_driver ? push_frame(f, in, time, err)
                      : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);

@@ -27,6 +27,7 @@ typedef struct mhi_feed {
     double guess[MHI_FEED_INLETS]; /* s: least (received - stamp), where no offset is known */
     int32_t driver;                /* inlet whose samples are the frames; -1: none yet */
     int32_t running;               /* 0: samples are passed over */
+    double begun;                  /* s of CLOCK_MONOTONIC, first sample of the driver; NaN: none */
     double start;                  /* s of CLOCK_MONOTONIC, of the first frame */
     double last;                   /* s since then, of the last frame */
     double *waiting;               /* ring of frames without the electrodes' EMG */

@@ -26,7 +26,7 @@ typedef struct mhi_inlet {
     mhi_electrodes *electrodes; /* where is_raw; its own */
     mhi_stamp stamp;
     double delay;  /* s, of the source */
-    double newest; /* s, time of its newest sample; -inf: none */
+    double newest; /* s of CLOCK_MONOTONIC, its newest sample; -inf: none */
     int64_t n_samples, n_zero;
     int32_t lost;             /* the source says that it sends nothing */
     char **missing, **unused; /* labels, for whoever looks; NULL-terminated */

@@ -51,6 +51,7 @@ void mhi_mailbox_put(mhi_mailbox *box, mhi_packet *packet); /* takes it over; NU
 /* The oldest packet, which becomes the caller's; waits for one until `deadline` (s of
  * CLOCK_MONOTONIC); NULL: none came. [any] */
 mhi_packet *mhi_mailbox_take(mhi_mailbox *box, double deadline);
+void mhi_mailbox_put_back(mhi_mailbox *box, mhi_packet *packet); /* the oldest again. [any] */
 int32_t mhi_mailbox_waiting(mhi_mailbox *box); /* packets in it. [any] */
 void mhi_mailbox_wake(mhi_mailbox *box);       /* whoever waits comes back. [any] */
 

@@ -266,17 +266,14 @@ static mhe_status wait_for_streams(mhe_live *l, mhe_error *err) {
             return mhe_fail(err, MHE_E_IO, "after %g s still waiting for %.700s", l->wait, missing);
         }
         mhi_packet *p = mhi_mailbox_take(l->box, now + LOOK);
+        if (p != NULL && p->kind == MHI_PACKET_SAMPLES &&
+            list_missing(l, missing, sizeof missing) == 0) {
+            mhi_mailbox_put_back(l->box, p); /* the last source is there: the run's first sample */
+            break;
+        }
         status = p == NULL ? MHE_OK : take_packet(l, p, err);
         status = status == MHE_OK ? check_sources(l, &ended, err) : status;
         mhi_live_serve(l);
-    }
-    /* descriptions come before what they describe: take those that wait */
-    while (status == MHE_OK && l->feed.n_inlets == 0 && !stopped(l)) {
-        mhi_packet *p = mhi_mailbox_take(l->box, mhi_seconds() + LOOK);
-        status = p == NULL ? check_sources(l, &ended, err) : take_packet(l, p, err);
-        if (p == NULL && ended == l->run->sources.n) {
-            break;
-        }
     }
     return status;
 }
@@ -326,21 +323,36 @@ mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
     return status;
 }
 
-/* All streams that were described so far decide what drives the run. */
-mhe_status mhi_live_begin(mhe_live *l, mhe_error *err) {
+/* Descriptions that are still on their way are taken, samples before them kept for the run. */
+static mhe_status take_descriptions(mhe_live *l, mhe_error *err) {
     mhe_status status = MHE_OK;
+    mhi_packet *kept = NULL; /* the newest first */
     const double until = mhi_seconds() + 0.2;
-    while (status == MHE_OK && mhi_seconds() < until) { /* what else is described at the start */
-        int32_t n = 0;
+    int32_t n = 0;
+    while (status == MHE_OK && n < l->run->sources.n && mhi_seconds() < until) {
+        mhi_packet *p = mhi_mailbox_take(l->box, mhi_seconds() + LOOK);
+        if (p != NULL && p->kind == MHI_PACKET_SAMPLES) {
+            p->next = kept;
+            kept = p;
+        } else if (p != NULL) {
+            status = take_packet(l, p, err);
+        }
+        n = 0;
         for (int32_t i = 0; i < l->run->sources.n; i++) {
             n += mhi_feed_inlet(&l->feed, i, 0) != NULL;
         }
-        if (n == l->run->sources.n) {
-            break;
-        }
-        mhi_packet *p = mhi_mailbox_take(l->box, mhi_seconds() + LOOK);
-        status = p == NULL ? MHE_OK : take_packet(l, p, err);
     }
+    while (kept != NULL) {
+        mhi_packet *p = kept;
+        kept = p->next;
+        mhi_mailbox_put_back(l->box, p);
+    }
+    return status;
+}
+
+/* All streams that were described so far decide what drives the run. */
+mhe_status mhi_live_begin(mhe_live *l, mhe_error *err) {
+    mhe_status status = take_descriptions(l, err);
     status = status == MHE_OK ? mhi_feed_begin(&l->feed, err) : status;
     if (status == MHE_OK) {
         const mhi_inlet *in = &l->feed.inlets[l->feed.driver];

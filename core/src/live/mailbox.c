@@ -153,6 +153,15 @@ void mhi_mailbox_put(mhi_mailbox *box, mhi_packet *packet) {
     (void)pthread_mutex_unlock(&box->mutex);
 }
 
+void mhi_mailbox_put_back(mhi_mailbox *box, mhi_packet *packet) {
+    (void)pthread_mutex_lock(&box->mutex);
+    packet->next = box->first;
+    box->last = box->first == NULL ? packet : box->last;
+    box->first = packet;
+    box->n++;
+    (void)pthread_mutex_unlock(&box->mutex);
+}
+
 mhi_packet *mhi_mailbox_take(mhi_mailbox *box, double deadline) {
     const struct timespec until = {(time_t)deadline, (long)(1e9 * (deadline - floor(deadline)))};
     int code = 0;

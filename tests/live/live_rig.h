@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* live_rig.h: live runs in tests: a config in memory, lines that are told, a thread that directs.
+ */
+#ifndef TEST_LIVE_RIG_H
+#define TEST_LIVE_RIG_H
+
+#include "support.h"
+
+#include <mhe/library.h>
+#include <mhe/live.h>
+#include <pthread.h>
+
+/* A folder of the test's own; "" where none can be made. Removed by live_rig_clean. */
+const char *live_rig_folder(void);
+int live_rig_clean(void **state);
+
+/* What a run tells, readable while it runs. */
+typedef struct live_words {
+    pthread_mutex_t mutex;
+    char text[65536];
+    size_t n;
+} live_words;
+
+/* How often a text was told so far. */
+int32_t live_words_count(live_words *words, const char *text);
+/* Waits until it was told `times` times; 0: it never was. */
+int live_words_wait(live_words *words, const char *text, int32_t times);
+
+typedef struct live_rig {
+    const char *name;   /* of its folder of results */
+    const char *config; /* YAML */
+    const char *record; /* NULL: none */
+    double seconds;     /* of estimates; 0: no end */
+    /* Runs beside it on a thread of its own, with `data`; NULL: nothing does. */
+    void *(*director)(void *data);
+    void *data;
+    live_words words;
+    mhe_live *live; /* while it runs */
+    char *summary;  /* JSON; free by mhe_free */
+    mhe_error err;
+} live_rig;
+
+mhe_status live_rig_run(live_rig *rig);
+
+double live_rig_number(const char *json, const char *key); /* the first of that name */
+
+/* The numbers of a table that was written; the rows without time. NULL: no such file. */
+double *live_rig_table(const char *name, const char *file, int32_t *n_rows, int32_t *n_columns);
+
+#endif
