@@ -398,6 +398,9 @@ AT(mhe_cost_ops, destroy, 16);
 AT(mhe_cost_ops, layout, 24);
 AT(mhe_cost_ops, residual, 32);
 AT(mhe_cost_ops, jacobian, 40);
+SIZE(mhe_own_costs, 24);
+AT(mhe_own_costs, data, 8);
+AT(mhe_own_costs, find, 16);
 
 SIZE(mhe_kinematics, 88);
 AT(mhe_kinematics, size, 0);

@@ -163,6 +163,20 @@ typedef struct mhe_cost_ops { /* required: layout, residual */
     mhe_status (*jacobian)(const void *self, const mhe_stage *stage, double *J, mhe_error *err);
 } mhe_cost_ops;
 
+/* Service of the application's host (mhe_host.service) for the plugin mhe.cost.callback: costs that
+ * the program brings itself, for trying out; Python's come this way. */
+#define MHE_OWN_COSTS_SERVICE "mhe.own-costs/1"
+
+typedef struct mhe_own_costs mhe_own_costs;
+struct mhe_own_costs {
+    uint32_t size;
+    void *data; /* the application's own */
+    /* The cost of that name and what is handed to its functions as `self`; NULL: there is none.
+     * create and destroy are not called, layout, residual and jacobian are needed; all of it lives
+     * longer than the config. [cold] */
+    const mhe_cost_ops *(*find)(const mhe_own_costs *costs, const char *name, void **self);
+};
+
 #ifdef __cplusplus
 }
 #endif
