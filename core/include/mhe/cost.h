@@ -16,6 +16,9 @@
  *   muscle_force     [n_muscles]    N, along the tendon
  *   joint_moment     [n_q]          N m (N), by the muscles: -L_q^T F
  *   residual_torque  [n_q]          N m (N); only where switched on
+ *   actuator         [n_actuators]  1, in parts of the optimal force; only where switched on
+ *   loop_gap, loop_rate  three or six a loop of the model; m, m/s (of welds also 1, rad/s). Where
+ *                    there are any the problem has terms of its own that bring them to 0
  *
  * Missing data: a missing sample is NaN in `y_ref`; a signal that has no value at a node (controls
  * at the last node) is NaN in `y`. A residual must let NaN through; the core then drops its row and
