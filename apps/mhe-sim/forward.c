@@ -63,7 +63,10 @@ static mhe_status first_state(forward *f, mhe_error *err) {
             s->x[part * s->n_q + i] = given[part]->n > 0 ? given[part]->values[i] : unset;
         }
     }
-    return mhi_system_equilibrium(s->context, s->x, s->x + s->n_q, s->u, s->x, err);
+    const mhe_status status = mhi_system_close_loops(s->context, s->x, s->x + s->n_q, err);
+    return status != MHE_OK
+               ? status
+               : mhi_system_equilibrium(s->context, s->x, s->x + s->n_q, s->u, s->x, err);
 }
 
 static mhe_status integrate(forward *f, mhe_error *err) {

@@ -4,10 +4,12 @@
  *
  * path spring: tension = k (l - rest) (1 + dissipation l'), 0 where that is not above 0 (OpenSim's
  * PathSpring); one between two points also pushes. Ligament: tension = scale curve(l / rest), 0
- * below the rest length (OpenSim's Ligament). Coordinate: f = -k (q - rest) - viscosity qdot. */
+ * below the rest length (OpenSim's Ligament). Coordinate: f = -k (q - rest) - viscosity qdot.
+ * Bushing: push = -K deflection - D rate, component by component (OpenSim's BushingForce). */
 #include "../coordinate.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 struct springs_config {
     double scale;
@@ -17,18 +19,20 @@ struct springs {
     const mhe_description *d;
     double scale;
     int32_t n_paths;
-    int32_t *paths; /* those of the springs, then those of the ligaments */
+    int32_t *paths;        /* those of the springs, then those of the ligaments */
+    mhe_frame_pair *pairs; /* of the bushings */
 };
 
 static const mhe_option springs_options[] = {
     MHE_OPT_REAL(struct springs_config, scale, 1, 0, 1e6, "1",
-                 "Factor of all springs and ligaments; 0: none acts."),
+                 "Factor of all springs, ligaments and bushings; 0: none acts."),
 };
 
 static void springs_destroy(void *self) {
     struct springs *s = self;
     if (s != NULL) {
         free(s->paths);
+        free(s->pairs);
         free(s);
     }
 }
@@ -42,14 +46,22 @@ static mhe_status springs_create(const mhe_host *host, const mhe_description *d,
         s->scale = ((const struct springs_config *)config)->scale;
         s->n_paths = d->n_path_springs + d->n_ligaments;
         s->paths = calloc((size_t)s->n_paths + 1, sizeof *s->paths);
+        s->pairs = calloc((size_t)d->n_bushings + 1, sizeof *s->pairs);
     }
-    if (s == NULL || s->paths == NULL) {
+    if (s == NULL || s->paths == NULL || s->pairs == NULL) {
         springs_destroy(s);
         return mhe_fail(err, MHE_E_MEMORY, "no memory for the springs");
     }
     for (int32_t i = 0; i < s->n_paths; i++) {
         const int32_t ligament = i - d->n_path_springs;
         s->paths[i] = ligament < 0 ? d->path_springs[i].path : d->ligaments[ligament].path;
+    }
+    for (int32_t i = 0; i < d->n_bushings; i++) {
+        for (int k = 0; k < 2; k++) {
+            s->pairs[i].body[k] = d->bushings[i].body[k];
+            memcpy(s->pairs[i].r[k], d->bushings[i].r[k], sizeof s->pairs[i].r[k]);
+            memcpy(s->pairs[i].p[k], d->bushings[i].p[k], sizeof s->pairs[i].p[k]);
+        }
     }
     *self = s;
     return MHE_OK;
@@ -63,6 +75,8 @@ static mhe_status springs_layout(const void *self, mhe_force_layout *out, mhe_er
         out->generalised = s->d->n_coordinate_springs > 0;
         out->n_paths = s->n_paths;
         out->paths = s->paths;
+        out->n_pairs = s->d->n_bushings;
+        out->pairs = s->pairs;
     }
     return MHE_OK;
 }
@@ -90,6 +104,26 @@ static void ligament_tension(const mhe_ligament *k, double l, double f[3]) {
     }
 }
 
+/* Pair i: diagonal in its six deflections. */
+static void bushing_push(const struct springs *s, int32_t i, const mhe_force_point *at,
+                         const mhe_force_values *out) {
+    const mhe_bushing *b = &s->d->bushings[i];
+    for (int32_t k = 0; k < 6; k++) {
+        const double stiffness =
+            s->scale * (k < 3 ? b->rotational_stiffness[k] : b->translational_stiffness[k - 3]);
+        const double damping =
+            s->scale * (k < 3 ? b->rotational_damping[k] : b->translational_damping[k - 3]);
+        out->push[6 * i + k] =
+            -stiffness * at->deflection[6 * i + k] - damping * at->deflection_rate[6 * i + k];
+        if (out->push_d != NULL) {
+            out->push_d[36 * i + 7 * k] = -stiffness;
+        }
+        if (out->push_w != NULL) {
+            out->push_w[36 * i + 7 * k] = -damping;
+        }
+    }
+}
+
 static mhe_status springs_evaluate(const void *self, const mhe_force_point *at,
                                    const mhe_force_values *out, mhe_error *err) {
     const struct springs *s = self;
@@ -109,6 +143,9 @@ static mhe_status springs_evaluate(const void *self, const mhe_force_point *at,
                 to[k][i] = s->scale * f[k];
             }
         }
+    }
+    for (int32_t i = 0; i < d->n_bushings && s->scale > 0; i++) {
+        bushing_push(s, i, at, out);
     }
     for (int32_t i = 0; i < d->n_coordinate_springs; i++) {
         const mhe_coordinate_spring *k = &d->coordinate_springs[i];
@@ -135,7 +172,8 @@ static const mhe_plugin springs_plugin = {
     .size = sizeof springs_plugin,
     .id = "mhe.force.model-springs",
     .version = "0.2.0",
-    .summary = "Springs along paths, ligaments and springs of coordinates of the model file.",
+    .summary =
+        "Springs along paths, ligaments, springs of coordinates and bushings of the model file.",
     .reference = "doi:10.1371/journal.pcbi.1006223",
     .iface = MHE_FORCE_IFACE,
     .ops = &springs_ops,

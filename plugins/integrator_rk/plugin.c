@@ -8,19 +8,19 @@ static const mhe_option rk_options[] = {
                  "scheme; auto: radau where muscles have states beside their activation (elastic "
                  "tendons), else gauss."),
     MHE_OPT_INT(struct rk_config, stages, 0, 0, RK_MAX_STAGES, "1",
-                "Stages: order twice that with gauss, one less with radau; 0: 4 of gauss, 3 of "
+                "Stages: order twice that with gauss, one less with radau; 0: 2 of gauss, 3 of "
                 "radau."),
     MHE_OPT_REAL(struct rk_config, max_step, 0, 0, 10, "s",
                  "An interval is cut into equal steps no longer than this, at least 1e-6; 0: "
-                 "0.015, with radau 0.0025."),
+                 "0.03 with gauss, else 0.0025."),
     MHE_OPT_REAL(struct rk_config, newton_tolerance, 1e-10, 1e-14, 1e-3, "1",
                  "Error left in the stage velocities, relative to 1 + |qdot|."),
     MHE_OPT_INT(struct rk_config, max_newton, 20, 1, 1000, "1",
                 "Newton iterations before a step is halved."),
-    MHE_OPT_REAL(struct rk_config, activation_step, 1.7, 0.01, 10, "1",
+    MHE_OPT_REAL(struct rk_config, activation_step, 0, 0, 10, "1",
                  "Longest step of the activations, in their shortest time constant where it "
-                 "starts."),
-    MHE_OPT_REAL(struct rk_config, tolerance, 5e-6, 0, 1e-2, "1",
+                 "starts, at least 0.01; 0: 3.4 with gauss, else 1.7."),
+    MHE_OPT_REAL(struct rk_config, tolerance, 0, 0, 1e-2, "1",
                  "A Gauss step that may err by more, in units of max(1, |qdot|), at a kink or a "
                  "jump of the forces is halved; 0: never."),
 };

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define RK_SHORTEST 1e-6 /* max_step, s */
+#define RK_FINEST 0.01   /* activation_step */
 
 static mhe_status rk_accepts(const mhe_system *system, const void *config, mhe_error *err) {
     int32_t scheme = ((const struct rk_config *)config)->scheme;
@@ -33,10 +34,13 @@ static void rk_defaults(const mhe_system *system, struct rk_config *config) {
         config->scheme = system->n_z > 0 ? RK_RADAU : RK_GAUSS;
     }
     if (config->stages == 0) {
-        config->stages = config->scheme == RK_RADAU ? 3 : 4;
+        config->stages = config->scheme == RK_RADAU ? 3 : 2;
     }
     if (config->max_step == 0) {
-        config->max_step = config->scheme == RK_RADAU ? 0.0025 : 0.015;
+        config->max_step = config->scheme == RK_GAUSS ? 0.03 : 0.0025;
+    }
+    if (config->activation_step == 0) {
+        config->activation_step = config->scheme == RK_GAUSS ? 3.4 : 1.7;
     }
 }
 
@@ -53,6 +57,11 @@ static mhe_status rk_create(const mhe_host *host, const mhe_system *system, cons
         free(rk);
         return mhe_fail(err, MHE_E_CONFIG, "max_step: below %g s; 0 leaves it to the scheme",
                         RK_SHORTEST);
+    }
+    if (rk->config.activation_step > 0 && rk->config.activation_step < RK_FINEST) {
+        free(rk);
+        return mhe_fail(err, MHE_E_CONFIG, "activation_step: below %g; 0 leaves it to the scheme",
+                        RK_FINEST);
     }
     rk_defaults(system, &rk->config);
     rk->pad = (system->n_m + RK_LANES - 1) / RK_LANES * RK_LANES;
@@ -126,7 +135,7 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                   {&slot, (size_t)rk_slot_size(rk)},
                   {&trace, (size_t)rk_trace_size(rk)},
                   {&c->weights, RK_WEIGHED * (RK_WEIGHED + 1) / 2 * s * RK_ACTIVATION_STAGES},
-                  {&c->row, n_m},
+                  {&c->direct, 2 * n_q * (n_m > n_q ? n_m : n_q)},
                   {&c->adjoint, 2 * n_q * s * n_q},
                   {&c->carry, 2 * n_q * 2 * n_q},
                   {&c->sens, (2 * n_q + n_z) * columns},

@@ -14,7 +14,8 @@
 #define RK "mhe.integrator.rk"
 #define CVODES "mhe.integrator.sundials"
 #define EXACT "{rtol: 1e-10, atol: 1e-12}"
-#define REFINED "tolerance: 5e-6"
+#define FIXED "{stages: 4, max_step: 0.015, activation_step: 1.7}"
+#define REFINED "{stages: 4, max_step: 0.015, activation_step: 1.7, tolerance: 5e-6}"
 #define N_Q 4
 #define N_M 19
 #define N_X (2 * N_Q + N_M)
@@ -196,10 +197,12 @@ static const double intervals[] = {0.01, 0.02, 0.03, 0.06};
 static void degroote2016_against_cvodes(void **state) {
     (void)state;
     static struct sample sample;
-    static const char *const others[] = {
-        "{stages: 2, max_step: 0.005}", "{stages: 3, max_step: 0.01}",
-        "{stages: 4, max_step: 0.03}", "{stages: 6, max_step: 0.03}",
-        "{scheme: rk4, max_step: 0.0025}"};
+    static const char *const others[] = {"",
+                                         "{stages: 2, max_step: 0.005}",
+                                         "{stages: 3, max_step: 0.01}",
+                                         "{stages: 4, max_step: 0.03}",
+                                         "{stages: 6, max_step: 0.03}",
+                                         "{scheme: rk4, max_step: 0.0025}"};
     struct arm arm;
     mhi_table *motion = seed_motion();
     if (motion == NULL || test_plugin(CVODES, MHE_INTEGRATOR_IFACE) == NULL ||
@@ -209,7 +212,7 @@ static void degroote2016_against_cvodes(void **state) {
     }
     for (size_t d = 0; d < N_INTERVALS; d++) {
         draw(&arm, motion, intervals[d], &sample);
-        double worst = study(&arm, "", intervals[d], &sample);
+        double worst = study(&arm, FIXED, intervals[d], &sample);
         for (size_t k = 0; k < sizeof others / sizeof others[0]; k++) {
             (void)study(&arm, others[k], intervals[d], &sample);
         }
@@ -240,7 +243,7 @@ static void kinks_against_cvodes(void **state) {
         print_message("%s\n", curves[k]);
         for (size_t d = 0; d < N_INTERVALS; d++) {
             draw(&arm, motion, intervals[d], &sample);
-            (void)study(&arm, "tolerance: 0", intervals[d], &sample);
+            (void)study(&arm, FIXED, intervals[d], &sample);
             assert_true(study(&arm, REFINED, intervals[d], &sample) < 1e-5);
         }
         arm_close(&arm);
@@ -320,7 +323,7 @@ static void derivatives(void **state) {
 static void derivatives_of_cut_steps(void **state) {
     (void)state;
     differences("curves: paper2021", REFINED, 0.01, 1);
-    differences("curves: degroote2016", "tolerance: 1e-9", 0.03, 0);
+    differences("curves: degroote2016", "{stages: 4, tolerance: 1e-9}", 0.03, 0);
 }
 
 /* One interval from each node of the seed's motion lands on the next. */
@@ -356,7 +359,7 @@ static void seed_landing(void **state) {
     }
     landing(&arm, motion, RK, "{scheme: rk4, max_step: 0.002}", &dq, &dv, &da);
     assert_true(dq < 1e-6 && dv < 1e-4 && da < 1e-6);
-    landing(&arm, motion, RK, "", &dq, &dv, &da);
+    landing(&arm, motion, RK, REFINED, &dq, &dv, &da);
     assert_true(dq < 1e-5 && da < 1e-6);
     arm_close(&arm);
     mhi_table_free(motion);
@@ -390,7 +393,7 @@ static void seed_against_cvodes(void **state) {
         mhi_table_free(motion);
         skip();
     }
-    struct test_integrator fixed = test_integrator_open(RK, "tolerance: 0", &arm.counted, &arm);
+    struct test_integrator fixed = test_integrator_open(RK, FIXED, &arm.counted, &arm);
     struct test_integrator refined = test_integrator_open(RK, REFINED, &arm.counted, &arm);
     struct test_integrator exact = test_integrator_open(CVODES, EXACT, &arm.counted, &arm);
     double worst[2] = {0, 0}, worst_refined = 0; /* with and without kinks; all */

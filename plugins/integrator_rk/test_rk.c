@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define RK "mhe.integrator.rk"
+#define FINE "{stages: 4, max_step: 0.015, activation_step: 1.7, tolerance: 5e-6}"
 #define N_FLAGS 4 /* all combinations of SYSTEM_EXCITATION and SYSTEM_RESIDUALS */
 
 static const char *const schemes[] = {"stages: 1",
@@ -56,7 +57,7 @@ static void same_step_with_derivatives(void **state) {
     uint64_t seed = 6;
     mhe_system system;
     test_pendulum_system(SYSTEM_EXCITATION, &system);
-    struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
+    struct test_integrator rk = test_integrator_open(RK, FINE, &system, NULL);
     double worst = 0;
     for (int trial = 0; trial < 50; trial++) {
         double x[SYSTEM_X], u[SYSTEM_U], plain[SYSTEM_X], full[SYSTEM_X];
@@ -219,7 +220,7 @@ static void linear_system(void **state) {
         }
         exponential(rate, n, flow);
         random_state(&seed, &system, x, u);
-        struct test_integrator rk = test_integrator_open(RK, "stages: 4", &system, NULL);
+        struct test_integrator rk = test_integrator_open(RK, FINE, &system, NULL);
         test_integrate(&rk, x, u, dt, next, A, B);
         for (int32_t i = 0; i < n_x; i++) {
             double expected = 0;
@@ -241,7 +242,7 @@ static void energy(void **state) {
     (void)state;
     mhe_system system;
     test_pendulum_system(0, &system);
-    struct test_integrator rk = test_integrator_open(RK, "max_step: 0.01", &system, NULL);
+    struct test_integrator rk = test_integrator_open(RK, FINE, &system, NULL);
     double x[4] = {0.3, 0.9, 2, -1}, u[SYSTEM_M] = {0, 0, 0}, start, middle = 0, end = 0;
     start = test_pendulum_energy(x, x + 2);
     for (int k = 0; k < 4000; k++) {
@@ -263,7 +264,7 @@ static void against_cvodes(void **state) {
     for (int32_t flags = 0; flags < N_FLAGS; flags++) {
         mhe_system system;
         test_pendulum_system(flags, &system);
-        struct test_integrator rk = test_integrator_open(RK, "", &system, NULL);
+        struct test_integrator rk = test_integrator_open(RK, FINE, &system, NULL);
         struct test_integrator reference = test_integrator_open(
             "mhe.integrator.sundials", "{rtol: 1e-10, atol: 1e-12}", &system, NULL);
         if (reference.ops == NULL) {

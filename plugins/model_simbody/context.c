@@ -24,7 +24,7 @@ static mhe_status check_placement(const tree *t, mhe_error *err) {
     for (size_t i = 0; i < n; i++) {
         angle[i] = 0.3 + 0.1 * (double)(i % 7);
     }
-    mhe_status status = skeleton_create(t, 0, &made, err);
+    mhe_status status = skeleton_create(t, NULL, &made, err);
     if (status == MHE_OK) {
         status = skeleton_place(made, angle, r, p, err);
         skeleton_free(made);
@@ -190,7 +190,9 @@ static mhe_status context_allocate(simbody_context *c) {
                  {&c->factor, n_q * n_q},
                  {&c->bias, n_q},
                  {&c->rest, n_q},
-                 {&c->length_q, n_m * n_q}};
+                 {&c->length_q, n_m * n_q},
+                 {&c->loop_acceleration, 6 * n},
+                 {&c->loop_vdot, n_q}};
     size_t total = 0;
     for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++) {
         total += parts[i].n;
@@ -240,7 +242,7 @@ mhe_status simbody_context_create(const void *self, void **context, mhe_error *e
         goto fail;
     }
     if (c->dynamics == SIMBODY_DYNAMICS_SIMBODY) {
-        status = skeleton_create(c->tree, 1, &c->skeleton, err);
+        status = skeleton_create(c->tree, c->description, &c->skeleton, err);
     }
     if (status != MHE_OK) {
         goto fail;

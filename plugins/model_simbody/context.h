@@ -53,6 +53,7 @@ typedef struct simbody_context {
     double *mass, *factor;                         /* [n_q x n_q] */
     double *bias, *rest;                           /* [n_q] */
     double *length_q;                              /* [n_muscles x n_q] */
+    double *loop_acceleration, *loop_vdot;         /* [n_joints x 6], [n_q]; see loops.c */
 } simbody_context;
 
 /* inside.c: warns of paths whose points lie inside their obstacles at the default position. Of a

@@ -29,6 +29,8 @@ mhe_status simbody_inverse_dynamics(void *context, const double *vdot, double *t
                                     double *tau_v, mhe_error *err);
 mhe_status simbody_loads(void *context, const mhe_load *loads, int32_t n, const double *value,
                          double *tau, double *tau_q, double *tau_l, mhe_error *err);
+mhe_status simbody_loops(void *context, const double *vdot, const mhe_loop_values *out,
+                         mhe_error *err);
 mhe_status simbody_path_pattern(const void *self, uint8_t *pattern, mhe_error *err);
 int32_t simbody_path_points(void *context, int32_t path, double *points, int32_t n);
 mhe_status simbody_forward_dynamics(void *context, const double *tau, double *vdot, mhe_error *err);

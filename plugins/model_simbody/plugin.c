@@ -30,6 +30,7 @@ static const mhe_model_ops simbody_ops = {
     .loads = simbody_loads,
     .path_pattern = simbody_path_pattern,
     .path_points = simbody_path_points,
+    .loops = simbody_loops,
 };
 
 static const mhe_plugin simbody_plugin = {

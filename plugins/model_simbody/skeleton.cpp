@@ -14,14 +14,23 @@
 
 using namespace SimTK;
 
+/* A loop of the description as a constraint, with its frames on the links. */
+struct closure {
+    Constraint constraint;
+    MobilizedBody body[2];
+    Transform frame[2];
+    bool weld;
+};
+
 struct skeleton {
     const tree *source;
     MultibodySystem system;
     SimbodyMatterSubsystem matter;
     std::vector<MobilizedBody> links;
+    std::vector<closure> loops;
     std::vector<int> q, u; /* Simbody's numbers of the joints */
     State state;
-    Vector none, acceleration, torque;
+    Vector none, acceleration, torque, loop_error;
     Vector_<SpatialVec> weight; /* gravity on each body, filled at the pose */
     Matrix mass;
 
@@ -76,9 +85,39 @@ void add_link(skeleton &s, const tree_joint &joint, bool with_mass) {
     }
 }
 
-void build(skeleton &s, bool with_mass) {
+/* Where a frame of the description's body is: on which link, and how. */
+void place_frame(skeleton &s, const mhe_loop &loop, int k, closure &out) {
+    const Transform in_body(Rotation(matrix(loop.r[k]), true), vector(loop.p[k]));
+    if (loop.body[k] < 0) {
+        out.body[k] = s.matter.updGround();
+        out.frame[k] = in_body;
+        return;
+    }
+    const tree_place &at = s.source->bodies[loop.body[k]];
+    out.body[k] = at.link < 0 ? static_cast<MobilizedBody &>(s.matter.updGround())
+                              : s.links[static_cast<size_t>(at.link)];
+    out.frame[k] = Transform(Rotation(matrix(at.r), true), vector(at.p)) * in_body;
+}
+
+void add_loop(skeleton &s, const mhe_loop &loop) {
+    closure c;
+    c.weld = loop.kind == MHE_LOOP_WELD;
+    place_frame(s, loop, 0, c);
+    place_frame(s, loop, 1, c);
+    if (c.weld) {
+        c.constraint = Constraint::Weld(c.body[0], c.frame[0], c.body[1], c.frame[1]);
+    } else {
+        c.constraint = Constraint::Ball(c.body[0], c.frame[0].p(), c.body[1], c.frame[1].p());
+    }
+    s.loops.push_back(c);
+}
+
+void build(skeleton &s, const mhe_description *description) {
     for (int32_t i = 0; i < s.source->n_joints; i++) {
-        add_link(s, s.source->joints[i], with_mass);
+        add_link(s, s.source->joints[i], description != nullptr);
+    }
+    for (int32_t i = 0; description != nullptr && i < description->n_loops; i++) {
+        add_loop(s, description->loops[i]);
     }
     s.state = s.system.realizeTopology();
     s.system.realizeModel(s.state);
@@ -142,14 +181,83 @@ void mass_matrix(skeleton &s, double *mass) {
     }
 }
 
+void set_speeds(skeleton &s, const double *speed) {
+    Vector &u = s.state.updU();
+    for (size_t i = 0; i < s.links.size(); i++) {
+        u[s.u[i]] = speed[i];
+    }
+    s.system.realize(s.state, Stage::Velocity);
+}
+
+/* Simbody's rows of a loop, measured in the axes of the bodies' common ancestor, brought to ground.
+ * A weld's come first those of its turning: of axes x, y, z of frame 2 with y, z, x of frame 1,
+ * each the relative angular velocity along their cross product. */
+void rows_to_ground(const skeleton &s, const closure &c, const Vector &simbody, double *out) {
+    const Rotation &axes = c.constraint.getAncestorMobilizedBody().getBodyTransform(s.state).R();
+    const int first = c.weld ? 3 : 0;
+    const Vec3 point = axes * Vec3(simbody[first], simbody[first + 1], simbody[first + 2]);
+    for (int i = 0; i < 3; i++) {
+        out[i] = point[i];
+    }
+    if (c.weld) {
+        const Rotation b = c.body[0].getBodyTransform(s.state).R() * c.frame[0].R();
+        const Rotation f = c.body[1].getBodyTransform(s.state).R() * c.frame[1].R();
+        const Mat33 normal(~(f.x() % b.y()), ~(f.y() % b.z()), ~(f.z() % b.x()));
+        const Vec3 turning = normal.invert() * Vec3(simbody[0], simbody[1], simbody[2]);
+        for (int i = 0; i < 3; i++) {
+            out[3 + i] = turning[i];
+        }
+    }
+}
+
+void loop_gap(const skeleton &s, const closure &c, double *out) {
+    Transform x[2];
+    for (int k = 0; k < 2; k++) {
+        x[k] = c.body[k].getBodyTransform(s.state) * c.frame[k];
+    }
+    Vec3 turning(0);
+    for (int i = 0; i < 3; i++) {
+        out[i] = x[1].p()[i] - x[0].p()[i];
+        turning += 0.5 * (x[0].R().getAxisUnitVec(CoordinateAxis(i)) %
+                          x[1].R().getAxisUnitVec(CoordinateAxis(i)));
+    }
+    for (int i = 0; i < 3 && c.weld; i++) {
+        out[3 + i] = turning[i];
+    }
+}
+
+void loops(skeleton &s, const double *speed, const double *acceleration, double *gap, double *rate,
+           double *loop_acceleration) {
+    set_speeds(s, speed);
+    for (size_t i = 0; i < s.links.size(); i++) {
+        s.acceleration[s.u[i]] = acceleration[i];
+    }
+    s.matter.calcConstraintAccelerationErrors(s.state, s.acceleration, s.loop_error);
+    int row = 0;
+    for (const closure &c : s.loops) {
+        const int rows = c.weld ? 6 : 3;
+        if (gap != nullptr) {
+            loop_gap(s, c, gap + row);
+        }
+        if (rate != nullptr) {
+            rows_to_ground(s, c, c.constraint.getVelocityErrorsAsVector(s.state), rate + row);
+        }
+        if (loop_acceleration != nullptr) {
+            rows_to_ground(s, c, s.loop_error(row, rows), loop_acceleration + row);
+        }
+        row += rows;
+    }
+}
+
 } // namespace
 
-mhe_status skeleton_create(const tree *source, int32_t with_mass, skeleton **out, mhe_error *err) {
+mhe_status skeleton_create(const tree *source, const mhe_description *description, skeleton **out,
+                           mhe_error *err) {
     *out = nullptr;
     skeleton *made = nullptr;
     mhe_status status = guarded(err, [&] {
         made = new skeleton(source);
-        build(*made, with_mass != 0);
+        build(*made, description);
     });
     if (status != MHE_OK) {
         if (status !=
@@ -180,4 +288,9 @@ mhe_status skeleton_dynamics(skeleton *s, const double *speed, const double *acc
             mass_matrix(*s, mass);
         }
     });
+}
+
+mhe_status skeleton_loops(skeleton *s, const double *speed, const double *acceleration, double *gap,
+                          double *rate, double *loop_acceleration, mhe_error *err) {
+    return guarded(err, [&] { loops(*s, speed, acceleration, gap, rate, loop_acceleration); });
 }

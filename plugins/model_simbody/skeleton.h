@@ -12,9 +12,11 @@ extern "C" {
 
 typedef struct skeleton skeleton;
 
-/* `tree` must outlive the skeleton. with_mass = 0: for poses alone. Simbody refuses inertias that
- * no rigid body can have (triangle inequality), which files do hold. [cold] */
-mhe_status skeleton_create(const tree *tree, int32_t with_mass, skeleton **out, mhe_error *err);
+/* `tree` must outlive the skeleton. `description`, which the tree is of: with mass and loops; NULL:
+ * for poses alone. Simbody refuses inertias that no rigid body can have (triangle inequality),
+ * which files do hold. [cold] */
+mhe_status skeleton_create(const tree *tree, const mhe_description *description, skeleton **out,
+                           mhe_error *err);
 void skeleton_free(skeleton *skeleton); /* [cold] */
 
 /* Sets the joints to `angle` [n_joints] (rad or m) and writes the links' placement in ground: r
@@ -27,6 +29,13 @@ mhe_status skeleton_place(skeleton *skeleton, const double *angle, double *r, do
  * wanted. [hot] */
 mhe_status skeleton_dynamics(skeleton *skeleton, const double *speed, const double *acceleration,
                              double *torque, double *mass, mhe_error *err);
+
+/* What Simbody's constraints Ball and Weld say of the loops at the angles placed last, `speed` and
+ * `acceleration` [n_joints], in the rows and axes of mhe_loop_values; NULL: not wanted. Where loops
+ * are closed (and, for accelerations, keep so) these are the recursion's values; elsewhere Simbody
+ * measures rates in moving axes. [hot] */
+mhe_status skeleton_loops(skeleton *skeleton, const double *speed, const double *acceleration,
+                          double *gap, double *rate, double *loop_acceleration, mhe_error *err);
 
 #ifdef __cplusplus
 }

@@ -39,6 +39,7 @@ struct hill_value {
 struct hill_muscle;
 struct hill_shape;
 struct hill_millard;
+struct hill_file;
 typedef void (*hill_curve)(const struct hill_muscle *muscle, double a, double n, double s,
                            struct hill_value *out);
 
@@ -74,6 +75,7 @@ struct hill_muscle {
     double eccentric;                   /* (2 + 2 / A_f) / (F_len - 1) */
     double eccentric_max;               /* F_len */
     const struct hill_millard *millard; /* that set only */
+    const struct hill_file *file;       /* that set only */
     /* an elastic tendon, see elastic.h; lengths is NULL where the set has none */
     hill_lengths lengths;
     hill_speeds speeds;
@@ -98,16 +100,23 @@ struct hill_curve_set {
     int32_t published; /* takes the overrides `damping` and `vmax` */
     int32_t jumps;     /* its passive force does, and takes `passive_ramp` */
     int32_t millard;   /* needs hill_muscle.millard, which is there before prepare */
+    int32_t file;      /* needs hill_muscle.file likewise */
     void (*prepare)(const mhe_muscle *muscle, const struct hill_config *config,
                     struct hill_muscle *out);
 };
 
 extern const struct hill_curve_set hill_paper2021, hill_biorbd, hill_degroote2016, hill_thelen2003,
-    hill_millard2012;
+    hill_millard2012, hill_file;
+
+/* Curves that stand in the model file, with the muscle's type (Schutte 1993, RigidTendonMuscle). */
+struct hill_file {
+    int32_t type;
+    mhe_function active, passive, tendon, velocity;
+};
 
 /* Order of the choices of the option `curves`. */
 extern const struct hill_curve_set *const hill_curve_sets[];
-#define HILL_CURVE_CHOICES "auto|paper2021|biorbd|degroote2016|thelen2003|millard2012"
+#define HILL_CURVE_CHOICES "auto|paper2021|biorbd|degroote2016|thelen2003|millard2012|file"
 
 /* An instance: the muscles in the order of the model. */
 struct hill {
@@ -118,6 +127,7 @@ struct hill {
     double *rate_deact;           /* 1 / tau_deact, 1/s [n] */
     struct hill_muscle *m;        /* [n] */
     struct hill_millard *millard; /* [n], those of that set filled; NULL: none is */
+    struct hill_file *file;       /* likewise */
     double *lower, *upper;        /* [n_states x n] */
     uint8_t *present;             /* [n_states x n] */
 };

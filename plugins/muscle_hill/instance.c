@@ -14,8 +14,15 @@ const struct hill_curve_set *const hill_curve_sets[] = {NULL, /* as the file sta
                                                         &hill_biorbd,
                                                         &hill_degroote2016,
                                                         &hill_thelen2003,
-                                                        &hill_millard2012};
+                                                        &hill_millard2012,
+                                                        &hill_file};
 #define HILL_CURVE_SETS ((int32_t)(sizeof hill_curve_sets / sizeof hill_curve_sets[0]))
+
+/* Whether its curves stand in the model file. */
+static int hill_has_curves(const mhe_muscle *muscle) {
+    return (muscle->type == MHE_MUSCLE_SCHUTTE1993 || muscle->type == MHE_MUSCLE_RIGID) &&
+           muscle->active_force_length.n_pieces > 0;
+}
 
 /* The set of a muscle. */
 static const struct hill_curve_set *hill_set_of(const mhe_muscle *muscle,
@@ -25,6 +32,7 @@ static const struct hill_curve_set *hill_set_of(const mhe_muscle *muscle,
     }
     return muscle->type == MHE_MUSCLE_THELEN2003    ? &hill_thelen2003
            : muscle->type == MHE_MUSCLE_MILLARD2012 ? &hill_millard2012
+           : hill_has_curves(muscle)                ? &hill_file
                                                     : &hill_degroote2016;
 }
 
@@ -157,7 +165,8 @@ static void hill_tell_rigid(const mhe_host *host, const struct hill *hill,
 static mhe_status hill_make_elastic(const mhe_muscle *from, const struct hill_config *config,
                                     struct hill_muscle *m, mhe_error *err) {
     double vmax = config->vmax > 0 ? config->vmax : hill_or(from->max_contraction_velocity, 10);
-    m->elastic = (config->tendon == HILL_ELASTIC || from->ignore_tendon_compliance != 1) &&
+    m->elastic = m->tendon != NULL &&
+                 (config->tendon == HILL_ELASTIC || from->ignore_tendon_compliance != 1) &&
                  from->tendon_slack_length >= HILL_SHORT_TENDON * from->optimal_fiber_length;
     m->vmax = vmax;
     m->beta =
@@ -187,6 +196,18 @@ static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *from
         if (status != MHE_OK) {
             return status;
         }
+    }
+    if (set->file && !hill_has_curves(from)) {
+        return mhe_fail(err, MHE_E_CONFIG,
+                        "curves: muscle '%s' (line %d) has no curves in the model file; leave the "
+                        "option out",
+                        from->name, from->line);
+    }
+    if (set->file) {
+        hill->file[i] =
+            (struct hill_file){from->type, from->active_force_length, from->passive_force_length,
+                               from->tendon_force_length, from->force_velocity};
+        m->file = &hill->file[i];
     }
     hill->unpublished += !set->published;
     set->prepare(from, config, m);
@@ -246,8 +267,9 @@ mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t 
     hill->rate_act = calloc(n, sizeof *hill->rate_act);
     hill->rate_deact = calloc(n, sizeof *hill->rate_deact);
     hill->millard = calloc(n, sizeof *hill->millard);
+    hill->file = calloc(n, sizeof *hill->file);
     if (hill->m == NULL || hill->rate_act == NULL || hill->rate_deact == NULL ||
-        hill->millard == NULL) {
+        hill->millard == NULL || hill->file == NULL) {
         status = mhe_fail(err, MHE_E_MEMORY, "no memory for %d muscles", n_muscles);
     }
     for (int32_t i = 0; i < n_muscles && status == MHE_OK; i++) {
@@ -277,6 +299,7 @@ void hill_destroy(void *self) {
         free(hill->rate_deact);
         free(hill->m);
         free(hill->millard);
+        free(hill->file);
         free(hill->lower);
         free(hill->upper);
         free(hill->present);

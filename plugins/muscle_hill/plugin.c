@@ -5,7 +5,7 @@
 static const mhe_option hill_options[] = {
     MHE_OPT_ENUM(struct hill_config, curves, "auto", HILL_CURVE_CHOICES,
                  "Curve set; auto: thelen2003 and millard2012 where the file states these muscles, "
-                 "else degroote2016."),
+                 "file where their curves stand in it (Schutte 1993), else degroote2016."),
     MHE_OPT_REAL(struct hill_config, tau_act, 0, 0, 10, "s",
                  "Activation time constant; 0: the file's, else 0.010."),
     MHE_OPT_REAL(struct hill_config, tau_deact, 0, 0, 10, "s",

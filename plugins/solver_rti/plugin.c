@@ -17,7 +17,7 @@
 #include "rti.h"
 
 static const mhe_option rti_options[] = {
-    MHE_OPT_ENUM(struct rti_config, preset, "robust", "speed|balanced|robust",
+    MHE_OPT_ENUM(struct rti_config, preset, "balanced", "speed|balanced|robust",
                  "speed: one iteration a window, balanced: up to three, both with full steps; "
                  "robust: to the tolerance with a step that must help."),
     MHE_OPT_REAL(struct rti_config, tolerance, 1e-4, 1e-12, 1, "1",

@@ -397,6 +397,9 @@ AT(mhe_cost_ops, destroy, 16);
 AT(mhe_cost_ops, layout, 24);
 AT(mhe_cost_ops, residual, 32);
 AT(mhe_cost_ops, jacobian, 40);
+SIZE(mhe_own_costs, 24);
+AT(mhe_own_costs, data, 8);
+AT(mhe_own_costs, find, 16);
 
 SIZE(mhe_kinematics, 88);
 AT(mhe_kinematics, size, 0);
@@ -416,7 +419,7 @@ AT(mhe_load, body, 0);
 AT(mhe_load, axes, 4);
 AT(mhe_load, origin, 8);
 
-SIZE(mhe_model_ops, 88);
+SIZE(mhe_model_ops, 96);
 AT(mhe_model_ops, size, 0);
 AT(mhe_model_ops, create, 8);
 AT(mhe_model_ops, destroy, 16);
@@ -428,6 +431,17 @@ AT(mhe_model_ops, forward_dynamics, 56);
 AT(mhe_model_ops, loads, 64);
 AT(mhe_model_ops, path_pattern, 72);
 AT(mhe_model_ops, path_points, 80);
+AT(mhe_model_ops, loops, 88);
+SIZE(mhe_loop_values, 72);
+AT(mhe_loop_values, size, 0);
+AT(mhe_loop_values, gap, 8);
+AT(mhe_loop_values, gap_q, 16);
+AT(mhe_loop_values, rate, 24);
+AT(mhe_loop_values, rate_q, 32);
+AT(mhe_loop_values, rate_v, 40);
+AT(mhe_loop_values, acceleration, 48);
+AT(mhe_loop_values, acceleration_q, 56);
+AT(mhe_loop_values, acceleration_v, 64);
 
 SIZE(mhe_muscle_layout, 80);
 AT(mhe_muscle_layout, size, 0);
@@ -477,7 +491,7 @@ AT(mhe_muscle_ops, evaluate, 32);
 AT(mhe_muscle_ops, diagonal_rate, 40);
 AT(mhe_muscle_ops, equilibrium, 48);
 
-SIZE(mhe_force_layout, 88);
+SIZE(mhe_force_layout, 104);
 AT(mhe_force_layout, size, 0);
 AT(mhe_force_layout, name, 8);
 AT(mhe_force_layout, generalised, 16);
@@ -490,16 +504,25 @@ AT(mhe_force_layout, n_loads, 56);
 AT(mhe_force_layout, loads, 64);
 AT(mhe_force_layout, n_parameters, 72);
 AT(mhe_force_layout, parameter_names, 80);
+AT(mhe_force_layout, n_pairs, 88);
+AT(mhe_force_layout, pairs, 96);
 
-SIZE(mhe_force_point, 48);
+SIZE(mhe_frame_pair, 200);
+AT(mhe_frame_pair, body, 0);
+AT(mhe_frame_pair, r, 8);
+AT(mhe_frame_pair, p, 152);
+
+SIZE(mhe_force_point, 64);
 AT(mhe_force_point, size, 0);
 AT(mhe_force_point, q, 8);
 AT(mhe_force_point, v, 16);
 AT(mhe_force_point, length, 24);
 AT(mhe_force_point, velocity, 32);
 AT(mhe_force_point, input, 40);
+AT(mhe_force_point, deflection, 48);
+AT(mhe_force_point, deflection_rate, 56);
 
-SIZE(mhe_force_values, 96);
+SIZE(mhe_force_values, 120);
 AT(mhe_force_values, size, 0);
 AT(mhe_force_values, tau, 8);
 AT(mhe_force_values, tau_q, 16);
@@ -512,6 +535,9 @@ AT(mhe_force_values, tension_w, 64);
 AT(mhe_force_values, tension_p, 72);
 AT(mhe_force_values, load, 80);
 AT(mhe_force_values, load_w, 88);
+AT(mhe_force_values, push, 96);
+AT(mhe_force_values, push_d, 104);
+AT(mhe_force_values, push_w, 112);
 
 SIZE(mhe_force_ops, 56);
 AT(mhe_force_ops, size, 0);

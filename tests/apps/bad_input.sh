@@ -59,14 +59,14 @@ expect folder-as-config 'models' "$2/models"
 edit demo.yaml 's/^horizon:.*/horizon: {windw: 7}/'
 expect unknown-key "did you mean 'window'"
 edit demo.yaml 's/window: 7/window: seven/'
-expect wrong-type 'demo.yaml:9'
+expect wrong-type 'demo.yaml:8'
 edit demo.yaml 's/window: 7/window: -1/'
 expect out-of-range 'window'
-edit demo.yaml 's/mhe.solver.ipopt/mhe.solver.ipot/'
+echo 'solver: mhe.solver.ipot' >> demo.yaml
 expect unknown-plugin "did you mean 'mhe.solver.ipopt'"
-edit demo.yaml 's/mhe.solver.ipopt/mhe.muscle.hill/'
+echo 'solver: mhe.muscle.hill' >> demo.yaml
 expect wrong-kind-of-plugin 'mhe.muscle.hill'
-edit demo.yaml 's/tolerance: 1e-4/tolerence: 1e-4/'
+echo 'solver: {tolerence: 1e-4}' >> demo.yaml
 expect plugin-option "did you mean 'tolerance'"
 expect bad-set 'window' demo.yaml --set horizon.window=0
 expect set-unknown 'horizon' demo.yaml --set horzon.window=3

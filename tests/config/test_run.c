@@ -417,7 +417,7 @@ static void tables_are_documented(void **state) {
     mhe_error err = {0};
     const char *id = NULL;
     assert_int_equal(mhi_default_plugin("solver", &arena, &id, &err), MHE_OK);
-    assert_string_equal(id, "mhe.solver.ipopt");
+    assert_string_equal(id, "mhe.solver.rti");
     assert_int_equal(mhi_default_plugin("costs", &arena, &id, &err), MHE_OK);
     assert_null(id);
     mhi_arena_free(&arena);

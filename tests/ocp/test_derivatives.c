@@ -32,6 +32,11 @@ static const char *const problems[] = {
     "model: {file: $ARM19}\nmuscle: {curves: paper2021}\nformulation: activation\n"
     "costs: [{plugin: mhe.cost.rate, signal: markers, sigma: 0.1, huber: 1},\n"
     "  {plugin: mhe.cost.rate, signal: muscle_force, sigma: 100}]\n",
+    /* markers that count differently, and a coordinate's own task beside them */
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\n"
+    "data: {marker_weights: {file: " MHE_TEST_SOURCE_DIR "/tests/ocp/tasks.xml, LARMl: 4}}\n"
+    "costs: [{plugin: mhe.cost.min-excitation, markers: 100},\n"
+    "  {plugin: mhe.cost.track, signal: markers, sigma: 0.1, huber: 3}]\n",
 };
 
 typedef struct point {

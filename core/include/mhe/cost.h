@@ -16,6 +16,9 @@
  *   muscle_force     [n_muscles]    N, along the tendon
  *   joint_moment     [n_q]          N m (N), by the muscles: -L_q^T F
  *   residual_torque  [n_q]          N m (N); only where switched on
+ *   actuator         [n_actuators]  1, in parts of the optimal force; only where switched on
+ *   loop_gap, loop_rate  three or six a loop of the model; m, m/s (of welds also 1, rad/s). Where
+ *                    there are any the problem has terms of its own that bring them to 0
  *
  * Missing data: a missing sample is NaN in `y_ref`; a signal that has no value at a node (controls
  * at the last node) is NaN in `y`. A residual must let NaN through; the core then drops its row and
@@ -160,6 +163,20 @@ typedef struct mhe_cost_ops { /* required: layout, residual */
      * takes central differences and says so in the log. [hot] */
     mhe_status (*jacobian)(const void *self, const mhe_stage *stage, double *J, mhe_error *err);
 } mhe_cost_ops;
+
+/* Service of the application's host (mhe_host.service) for the plugin mhe.cost.callback: costs that
+ * the program brings itself, for trying out; Python's come this way. */
+#define MHE_OWN_COSTS_SERVICE "mhe.own-costs/1"
+
+typedef struct mhe_own_costs mhe_own_costs;
+struct mhe_own_costs {
+    uint32_t size;
+    void *data; /* the application's own */
+    /* The cost of that name and what is handed to its functions as `self`; NULL: there is none.
+     * create and destroy are not called, layout, residual and jacobian are needed; all of it lives
+     * longer than the config. [cold] */
+    const mhe_cost_ops *(*find)(const mhe_own_costs *costs, const char *name, void **self);
+};
 
 #ifdef __cplusplus
 }

@@ -299,8 +299,8 @@ typedef struct mhe_actuator {
     double min_control, max_control; /* NaN: none */
 } mhe_actuator;
 
-/* Two frames that stay together: their origins (a point), or frames (a weld). The model integrates
- * as if they were free; what holds them is a force of the system. */
+/* Two frames that stay together: their origins (a point), or frames (a weld). To the model they are
+ * free; what holds them is a force that the system finds with its accelerations. */
 #define MHE_LOOP_POINT 0
 #define MHE_LOOP_WELD 1
 typedef struct mhe_loop {

@@ -2,10 +2,11 @@
 /* force.h: interface of force plugins (kind "force"): what acts on the skeleton beside muscles and
  * residual torques.
  *
- * A force plugin acts in up to three ways, each with its derivatives, and the core brings them into
+ * A force plugin acts in up to four ways, each with its derivatives, and the core brings them into
  * the equation of motion and its derivatives:
  *   - a generalised force tau [n_q] from q, qdot and its inputs (coordinate limits, springs);
  *   - tensions along paths of the model, from their lengths and velocities (ligaments, springs);
+ *   - pushes between pairs of frames on bodies, from how they stand to each other (bushings);
  *   - loads on bodies: a force at a point and a torque, from its inputs (ground reaction, a weight
  * in the hand). The frames that a load is given in are constant; how it turns into generalised
  *     force is the model's affair.
@@ -24,6 +25,14 @@ extern "C" {
 
 #define MHE_FORCE_IFACE "mhe.force/1"
 
+/* Two frames on bodies (-1: ground), each (r, p) in its body. How frame 2 stands in frame 1 are six
+ * numbers, its deflection: body-fixed x-y-z angles (rad), then the place of its origin (m). Where
+ * the second angle is at +-pi/2 there is no value (MHE_RETRY). */
+typedef struct mhe_frame_pair {
+    int32_t body[2];
+    double r[2][9], p[2][3];
+} mhe_frame_pair;
+
 /* Filled by layout(); zeroed before. Strings and arrays live as long as the instance. */
 typedef struct mhe_force_layout {
     uint32_t size;
@@ -38,6 +47,8 @@ typedef struct mhe_force_layout {
     const mhe_load *loads;          /* [n_l] bodies and frames */
     int32_t n_parameters;           /* n_p by which derivatives can be had */
     const char *const *parameter_names;
+    int32_t n_pairs;             /* n_f */
+    const mhe_frame_pair *pairs; /* [n_f] */
 } mhe_force_layout;
 
 /* Where to evaluate. Lent for the call. */
@@ -46,6 +57,8 @@ typedef struct mhe_force_point {
     const double *q, *v;             /* [n_q] */
     const double *length, *velocity; /* of its paths [n_t] */
     const double *input;             /* [n_w] */
+    const double *deflection;        /* of its pairs [n_f x 6] */
+    const double *deflection_rate;   /* [n_f x 6] */
 } mhe_force_point;
 
 /* What is wanted; NULL: not. All zeroed by the core before the call. Row-major. */
@@ -62,6 +75,9 @@ typedef struct mhe_force_values {
     double *tension_p; /* [n_t x n_p] */
     double *load;      /* [n_l x 9]: force N, point m, torque N m, each 3, see mhe_load */
     double *load_w;    /* [9 n_l x n_w] */
+    double *push;      /* [n_f x 6] N m, N: the work-conjugate of each pair's deflection */
+    double *push_d;    /* [n_f x 6 x 6] by its own pair's deflection */
+    double *push_w;    /* [n_f x 6 x 6] by that one's rate */
 } mhe_force_values;
 
 typedef struct mhe_force_ops {

@@ -14,7 +14,7 @@
 extern "C" {
 #endif
 
-/* "0.1.0": of the library that runs, where version.h says what was compiled against. [any] */
+/* "0.2.0": of the library that runs, where version.h says what was compiled against. [any] */
 MHE_API const char *mhe_version(void);
 
 /* What a status means, in a few words; of an unknown one "an unknown status". [any] */

@@ -4,8 +4,8 @@
  * A model turns a description into kinematics and dynamics of a tree of rigid bodies, lengths of
  * paths and positions of markers. It knows no muscle force and no cost. n_q (free coordinates), n_b
  * (bodies), n_p (paths, the muscles' first) and n_k (markers) are those of the description.
- * Equation of motion: M(q) vdot + bias(q, v) = tau. Loops of the description are open here: what
- * closes them is a force. */
+ * Equation of motion: M(q) vdot + bias(q, v) = tau. Loops of the description are open here: the
+ * model says how far, and the core finds the force that keeps them closed. */
 #ifndef MHE_MODEL_H
 #define MHE_MODEL_H
 
@@ -35,6 +35,30 @@ typedef struct mhe_kinematics {
                      * ground axes, per unit of each coordinate's rate */
     double *dependent; /* values of the dependent coordinates [n_dependents], rad (m) */
 } mhe_kinematics;
+
+/* Rows of a description's loops, loop by loop: three of a point, six of a weld (the point's first).
+ * [any] */
+static inline int32_t mhe_loop_rows(const mhe_description *description) {
+    int32_t n = 0;
+    for (int32_t i = 0; i < description->n_loops; i++) {
+        n += description->loops[i].kind == MHE_LOOP_WELD ? 6 : 3;
+    }
+    return n;
+}
+
+/* How far the loops are open, in ground axes: frame 2's origin less frame 1's (m), and of a weld
+ * half the sum of axis 1 x axis 2 over the three axes, which is the sine of the angle between the
+ * frames times its axis. n_c rows; NULL: not wanted. All derivatives exact, row-major. A force (or
+ * moment) lambda [n_c] that pulls body 2 so and body 1 the other way does rate_v^T lambda. */
+typedef struct mhe_loop_values {
+    uint32_t size;
+    double *gap, *gap_q;            /* [n_c], [n_c x n_q] */
+    double *rate, *rate_q, *rate_v; /* velocity of origin 2 less origin 1, and the relative angular
+                                     * velocity: d gap/dt where the loop is closed; [n_c], the
+                                     * derivatives [n_c x n_q] */
+    double *acceleration;           /* d rate/dt at vdot [n_c] */
+    double *acceleration_q, *acceleration_v; /* with vdot held [n_c x n_q] */
+} mhe_loop_values;
 
 /* A force at a point and a torque that act on a body. `axes`: the body in whose axes force and
  * torque are given; `origin`: the body in whose frame (axes and origin) the point is; -1: ground.
@@ -74,6 +98,10 @@ typedef struct mhe_model_ops {
      * that are on, and points along what it wraps around. Returns their number, which may be
      * larger than n. At the state of the last kinematics() call. [hot] */
     int32_t (*path_points)(void *context, int32_t path, double *points, int32_t n);
+    /* What `out` asks for at the state of the last kinematics() call and vdot [n_q] (NULL: 0). NULL
+     * or missing: the plugin takes no description with loops. [hot] */
+    mhe_status (*loops)(void *context, const double *vdot, const mhe_loop_values *out,
+                        mhe_error *err);
 } mhe_model_ops;
 
 #ifdef __cplusplus

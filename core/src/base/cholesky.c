@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "base/cholesky.h"
 
+#include "base/clones.h"
+
 #include <math.h>
+
+/* Four doubles, wherever they lie. */
+typedef double lanes __attribute__((vector_size(32), aligned(8), may_alias));
 
 int mhi_cholesky_factor(double *A, int32_t n) {
     for (int32_t j = 0; j < n; j++) {
@@ -39,17 +44,129 @@ static void scale(double *row, double factor, int32_t n) {
     }
 }
 
-void mhi_cholesky_solve(const double *L, int32_t n, double *B, int32_t n_columns) {
+/* 4 `wide` columns of B, whose sums stay in registers; `wide` is a constant once inlined. */
+__attribute__((always_inline)) static inline void solve_strip(int32_t wide, const double *L,
+                                                              int32_t n, double *B, int32_t ld) {
     for (int32_t i = 0; i < n; i++) {
-        for (int32_t k = 0; k < i; k++) {
-            subtract(B + i * n_columns, B + k * n_columns, L[i * n + k], n_columns);
+        lanes sum[4];
+        for (int32_t c = 0; c < wide; c++) {
+            sum[c] = *(lanes *)(B + i * ld + 4 * c);
         }
-        scale(B + i * n_columns, L[i * n + i], n_columns);
+        for (int32_t k = 0; k < i; k++) {
+            for (int32_t c = 0; c < wide; c++) {
+                sum[c] -= L[i * n + k] * *(lanes *)(B + k * ld + 4 * c);
+            }
+        }
+        for (int32_t c = 0; c < wide; c++) {
+            *(lanes *)(B + i * ld + 4 * c) = L[i * n + i] * sum[c];
+        }
     }
     for (int32_t i = n - 1; i >= 0; i--) {
-        for (int32_t k = i + 1; k < n; k++) {
-            subtract(B + i * n_columns, B + k * n_columns, L[k * n + i], n_columns);
+        lanes sum[4];
+        for (int32_t c = 0; c < wide; c++) {
+            sum[c] = *(lanes *)(B + i * ld + 4 * c);
         }
-        scale(B + i * n_columns, L[i * n + i], n_columns);
+        for (int32_t k = i + 1; k < n; k++) {
+            for (int32_t c = 0; c < wide; c++) {
+                sum[c] -= L[k * n + i] * *(lanes *)(B + k * ld + 4 * c);
+            }
+        }
+        for (int32_t c = 0; c < wide; c++) {
+            *(lanes *)(B + i * ld + 4 * c) = L[i * n + i] * sum[c];
+        }
+    }
+}
+
+static void solve_column(const double *L, int32_t n, double *B, int32_t ld) {
+    for (int32_t i = 0; i < n; i++) {
+        double sum = B[i * ld];
+        for (int32_t k = 0; k < i; k++) {
+            sum -= L[i * n + k] * B[k * ld];
+        }
+        B[i * ld] = sum * L[i * n + i];
+    }
+    for (int32_t i = n - 1; i >= 0; i--) {
+        double sum = B[i * ld];
+        for (int32_t k = i + 1; k < n; k++) {
+            sum -= L[k * n + i] * B[k * ld];
+        }
+        B[i * ld] = sum * L[i * n + i];
+    }
+}
+
+CLONES static void solve_columns(const double *L, int32_t n, double *B, int32_t n_columns) {
+    int32_t c = 0;
+    for (; c + 16 <= n_columns; c += 16) {
+        solve_strip(4, L, n, B + c, n_columns);
+    }
+    for (; c + 4 <= n_columns; c += 4) {
+        solve_strip(1, L, n, B + c, n_columns);
+    }
+    for (; c < n_columns; c++) {
+        solve_column(L, n, B + c, n_columns);
+    }
+}
+
+void mhi_cholesky_solve(const double *L, int32_t n, double *B, int32_t n_columns) {
+    solve_columns(L, n, B, n_columns);
+}
+
+#define REPEATED 1e-11
+
+/* Row i of L stands in row i of A, in the columns of `order`'s places: entry (i, k) belongs to the
+ * k-th chosen row. */
+int mhi_semidefinite_factor(double *A, int32_t n, int32_t *order) {
+    double largest = 0;
+    int32_t rank = 0;
+    for (int32_t i = 0; i < n; i++) {
+        order[i] = i;
+        largest = fmax(largest, A[i * n + i]);
+        if (!isfinite(A[i * n + i])) {
+            return -1;
+        }
+    }
+    for (; rank < n; rank++) {
+        int32_t best = rank; /* the remaining diagonal stands up to date in A */
+        for (int32_t k = rank + 1; k < n; k++) {
+            best = A[order[k] * n + order[k]] > A[order[best] * n + order[best]] ? k : best;
+        }
+        const int32_t chosen = order[best];
+        const double pivot = A[chosen * n + chosen];
+        if (!(pivot > REPEATED * largest)) {
+            break;
+        }
+        order[best] = order[rank];
+        order[rank] = chosen;
+        A[chosen * n + chosen] = 1 / sqrt(pivot);
+        for (int32_t k = rank + 1; k < n; k++) {
+            A[order[k] * n + chosen] *= A[chosen * n + chosen];
+        }
+        for (int32_t k = rank + 1; k < n; k++) {
+            for (int32_t j = rank + 1; j < n; j++) {
+                A[order[k] * n + order[j]] -= A[order[k] * n + chosen] * A[order[j] * n + chosen];
+            }
+        }
+    }
+    return rank;
+}
+
+void mhi_semidefinite_solve(const double *L, int32_t n, const int32_t *order, int32_t rank,
+                            double *B, int32_t n_columns) {
+    for (int32_t i = 0; i < rank; i++) {
+        double *row = B + order[i] * n_columns;
+        for (int32_t k = 0; k < i; k++) {
+            subtract(row, B + order[k] * n_columns, L[order[i] * n + order[k]], n_columns);
+        }
+        scale(row, L[order[i] * n + order[i]], n_columns);
+    }
+    for (int32_t i = rank - 1; i >= 0; i--) {
+        double *row = B + order[i] * n_columns;
+        for (int32_t k = i + 1; k < rank; k++) {
+            subtract(row, B + order[k] * n_columns, L[order[k] * n + order[i]], n_columns);
+        }
+        scale(row, L[order[i] * n + order[i]], n_columns);
+    }
+    for (int32_t i = rank; i < n; i++) {
+        scale(B + order[i] * n_columns, 0, n_columns);
     }
 }

@@ -10,6 +10,8 @@
 #define BELOW (-0.05)   /* a filter may swing below 0 */
 #define RAW_SHARE 0.1   /* of the samples are below 0: an alternating signal */
 #define OFTEN 0.002     /* share of samples above BEYOND that is no slip */
+#define MOSTLY 0.05     /* share that is another unit; noise as large as the EMG makes 0.02 */
+#define NEVER 10.0      /* of the MVC: another unit */
 #define QUIET 0.02      /* no muscle reaches 2 % of its MVC */
 #define OWN_PEAK 1e-6   /* a maximum of exactly 1 ... */
 #define OWN_PEAKS 3     /* ... in so many channels and in most of them */
@@ -66,7 +68,7 @@ static mhe_status check_scale(const char *path, const channel *all, int32_t n, m
                         "of raw",
                         path, low, high, 100 * n_below / n_samples);
     }
-    if (n_samples > 0 && n_beyond > OFTEN * n_samples) {
+    if (n_beyond > MOSTLY * n_samples || (high > NEVER && n_beyond > OFTEN * n_samples)) {
         return mhe_fail(err, MHE_E_INPUT,
                         "%s: values from %.4g to %.4g: %s Normalised EMG goes from 0 to 1", path,
                         low, high,
@@ -79,7 +81,7 @@ static mhe_status check_scale(const char *path, const channel *all, int32_t n, m
 /* One list of muscles a kind. */
 static void check_channels(const char *path, const mhe_description *d, const mhi_recording *r,
                            const channel *all, mhi_findings *findings) {
-    mhi_text flat = {0}, zero = {0}, own = {0}, below = {0};
+    mhi_text flat = {0}, zero = {0}, own = {0}, below = {0}, beyond = {0};
     int32_t n_own = 0, n_there = 0, n_quiet = 0;
     for (int32_t i = 0; i < d->n_muscles; i++) {
         const channel *c = &all[i];
@@ -95,6 +97,9 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
         }
         if (c->n_below > OFTEN * c->n) {
             add_name(&below, d->muscles[i].name);
+        }
+        if (c->n_beyond > OFTEN * c->n) {
+            add_name(&beyond, d->muscles[i].name);
         }
         if (fabs(c->high - 1) < OWN_PEAK) {
             add_name(&own, d->muscles[i].name);
@@ -116,6 +121,11 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL, "normalised EMG goes from 0 to 1",
                          "%s: values below 0: %s", path, below.data);
     }
+    if (beyond.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "percent, a wrong MVC, or noise? Normalised EMG goes from 0 to 1",
+                         "%s: values above %.0f times the MVC: %s", path, BEYOND, beyond.data);
+    }
     if (n_own >= OWN_PEAKS && 2 * n_own > n_there) {
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
                          "EMG scaled to each channel's own peak says nothing of how strong a "
@@ -132,6 +142,7 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
     mhi_text_free(&zero);
     mhi_text_free(&own);
     mhi_text_free(&below);
+    mhi_text_free(&beyond);
 }
 
 /* EMG that is there for part of the frames: estimates with and without it differ. */

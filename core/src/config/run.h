@@ -38,6 +38,9 @@ typedef struct mhi_model_section {
     mhe_text_map locked_at; /* coordinates that stay at this value, rad or m */
 } mhi_model_section;
 
+/* The key of data.marker_weights that names a file; one text alone is its value. */
+#define MHI_MARKER_TASK_FILE "file"
+
 typedef struct mhi_data_section {
     const char *markers, *emg, *reference; /* .trc; .sto .mot; .sto */
     const char *external_loads;            /* .xml */
@@ -48,7 +51,9 @@ typedef struct mhi_data_section {
     double marker_outlier;  /* m; 0: none */
     int32_t emg_saturation; /* frames; 0: any EMG is believed */
     mhe_text_map labels;    /* name in the file: name in the model */
-    const char *subject;    /* whose labels ("NAME:MARKER") are read; NULL: there is one */
+    mhe_text_map marker_weights; /* marker or pattern: weight; MHI_MARKER_TASK_FILE: a path */
+    int32_t rates;               /* 1: the markers tell joint velocities, too */
+    const char *subject;         /* whose labels ("NAME:MARKER") are read; NULL: there is one */
 } mhi_data_section;
 
 /* From the laboratory's frame to the model's: point -> scale turn point + shift. */
@@ -105,6 +110,7 @@ typedef struct mhi_horizon_section {
 
 typedef struct mhi_bounds_section {
     int32_t residual_torques;            /* 0: none; 1: one per coordinate */
+    int32_t actuators;                   /* 1: those of the model are controls */
     double residual_torque_max;          /* N m */
     mhe_text_list residual_torque_at;    /* coordinates that have one; n = 0: all */
     mhe_text_map residual_torque_limits; /* coordinate: largest magnitude, N m */
@@ -120,7 +126,8 @@ typedef struct mhi_realtime_section {
 typedef struct mhi_output_section {
     const char *node_name; /* as written; "auto" is left to the program */
     int32_t node;          /* what it means: 0 .. window; "auto": 0 */
-    int32_t picture; /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t picture;   /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t reactions; /* MHI_IN_* of model/joints.h */
     mhe_text_list formats;         /* of "sto", "csv", "mat"; .sto is written in any case */
     int32_t skip_first, skip_last; /* estimates left out of the errors in summary.json */
 } mhi_output_section;

@@ -72,15 +72,24 @@ static const mhe_option data_options[] = {
     MHE_OPT_MAP(mhi_data_section, labels, 0,
                 "Columns that the files call otherwise than the model, {NAME IN FILE: NAME IN "
                 "MODEL}."),
+    MHE_OPT_MAP(mhi_data_section, marker_weights, 0,
+                "Factor of a marker's squared error where costs compare markers one by one, "
+                "{MARKER or PATTERN*: WEIGHT}, 0 leaves it out; or the path of OpenSim's inverse "
+                "kinematics tasks (.xml), whose coordinate tasks count too; or both, {file: PATH, "
+                "MARKER: WEIGHT}."),
+    MHE_OPT_BOOL(mhi_data_section, rates, 0,
+                 "Joint velocities by inverse kinematics from frame to frame, which the signal "
+                 "qdot is to be close to where a cost follows it: they keep light segments from "
+                 "swinging between the frames."),
     MHE_OPT_TEXT(mhi_data_section, subject, 0, NULL,
                  "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };
 
 static const mhe_option transform_options[] = {
-    MHE_OPT_TEXTS(
-        mhi_transform_section, rotate, 0,
-        "Turn about an axis by degrees: x-90, or [AXIS, DEGREES], where the axis is x, y, z "
-        "or [a, b, c]."),
+    MHE_OPT_TEXTS(mhi_transform_section, rotate, 0,
+                  "Turn about an axis by degrees (of markers, and of external loads in ground): "
+                  "x-90, or [AXIS, DEGREES], where the axis is x, y, z "
+                  "or [a, b, c]."),
     MHE_OPT_REALS(mhi_transform_section, shift, 0, -DBL_MAX, DBL_MAX, "m",
                   "Added afterwards, in the model's frame."),
     MHE_OPT_REAL(mhi_transform_section, scale, 1, -1e6, 1e6, "1",
@@ -143,6 +152,9 @@ static const mhe_option horizon_options[] = {
 
 static const mhe_option bounds_options[] = {
     MHE_OPT_BOOL(mhi_bounds_section, residual_torques, 0, "Add a free torque at every coordinate."),
+    MHE_OPT_BOOL(mhi_bounds_section, actuators, 0,
+                 "Drive the model file's actuators: controls in parts of their optimal force, "
+                 "within its min_control and max_control."),
     MHE_OPT_REAL(mhi_bounds_section, residual_torque_max, 100, 0, INFINITY, "N m",
                  "Largest magnitude of a residual torque."),
     MHE_OPT_TEXTS(mhi_bounds_section, residual_torque_at, 0,
@@ -195,6 +207,9 @@ static const mhe_option output_options[] = {
                  "Draw estimated against reference, where gnuplot is installed."),
     MHE_OPT_TEXTS(mhi_output_section, formats, 0,
                   "Formats of the results beside .sto: csv, mat (MATLAB, all in results.mat)."),
+    MHE_OPT_ENUM(mhi_output_section, reactions, "none", "none|child|parent|ground",
+                 "What joints transmit, force and moment on the child at the joint's centre, in "
+                 "the axes of the child, of the parent or of ground (reactions.sto)."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
                 "Estimates at the start that the errors in summary.json leave out."),
     MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",

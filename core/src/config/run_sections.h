@@ -35,6 +35,8 @@ void mhi_run_write_channels(const mhi_run *run, mhi_text *out);
 /* What data.transform means (run_transform.c): lists are made flat before the section is read, and
  * the turn computed after it. [cold] */
 void mhi_run_flatten_rotate(const mhi_run *run);
+/* data.marker_weights as one text becomes {file: TEXT} (run_weights.c). [cold] */
+mhe_status mhi_run_flatten_weights(mhi_run *run, mhe_error *err);
 mhe_status mhi_run_check_transform(mhi_run *run, mhe_error *err);
 
 /* The plugins of a section that is a list; the costs' pair is kept as two fields. */

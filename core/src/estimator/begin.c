@@ -9,9 +9,12 @@ mhe_status mhi_begin_create(mhi_begin *b, const mhi_system *system, mhi_system_c
     *b = (mhi_begin){.n_q = n_q,
                      .q = MHI_TAKE(arena, double, n_q),
                      .v = MHI_TAKE(arena, double, n_q),
+                     .closed = MHI_TAKE(arena, double, n_q),
                      .activation = MHI_TAKE(arena, double, mhi_system_face(system)->n_m),
+                     .near = MHI_TAKE(arena, double, n_q),
                      .distance = MHI_TAKE(arena, double, nodes)};
-    if (b->q == NULL || b->v == NULL || b->activation == NULL || b->distance == NULL) {
+    if (b->q == NULL || b->v == NULL || b->closed == NULL || b->near == NULL ||
+        b->activation == NULL || b->distance == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     mhi_begin_forget(b);
@@ -57,6 +60,18 @@ static void take_angles(const mhe_estimator *e, int32_t k, double *q) {
     }
 }
 
+/* The posture near q in which the model's loops are closed, where there is one. */
+static void close_loops(mhe_estimator *e, double *q) {
+    double *near = e->begin.closed;
+    memcpy(near, q, sizeof *q * (size_t)e->n_q);
+    if (mhi_system_close_loops(mhi_ocp_context(e->ocp), near, NULL, NULL) == MHE_OK) {
+        for (int32_t i = 0; i < e->n_q; i++) {
+            const mhe_coordinate *c = &e->description->coordinates[i];
+            q[i] = mhi_clip(near[i], c->lower, c->upper);
+        }
+    }
+}
+
 /* Inverse kinematics node by node -> q of guess_x, `distance` [n+1] of the markers, NaN without. A
  * node without markers takes the posture before it; measured angles stand for themselves. */
 static mhe_status guess_postures(mhe_estimator *e, double *distance, double *nearest,
@@ -75,6 +90,7 @@ static mhe_status guess_postures(mhe_estimator *e, double *distance, double *nea
             return status;
         }
         take_angles(e, k, q);
+        close_loops(e, q);
         n_seen += !isnan(distance[k]);
         *nearest = fmin(*nearest, distance[k]);
         memcpy(mhi_row(e->window.guess_x, k, e->window.n_x), q, sizeof(double) * (size_t)e->n_q);
@@ -203,6 +219,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     memcpy(e->window.solution.u, e->window.guess_u,
            sizeof(double) * (size_t)(e->window.n * e->n_u));
     e->window.solution.has_multipliers = 0;
+    e->window.has_left = 0;
     mhi_phase_on(e, MHI_EVENT_BEGUN);
     e->begin.rounds = 0;
     mhi_window_set_bounds(e);

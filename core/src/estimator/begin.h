@@ -11,7 +11,9 @@
 typedef struct mhi_begin {
     mhi_start *start;   /* postures from markers */
     double *q, *v;      /* known first state [n_q], NaN where free */
+    double *closed;     /* [n_q] scratch */
     double *activation; /* [n_m] of a node, guessed */
+    double *near;       /* [n_q] scratch */
     double *distance;   /* [n+1] of the markers at each node */
     int32_t n_q;
     int32_t has_posture; /* a channel that tells the posture came, be its values missing */

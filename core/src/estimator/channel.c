@@ -37,8 +37,9 @@ static mhe_status name_units(const mhe_description *d, const mhi_signal *signal,
                              mhi_channel *c, mhe_error *err) {
     const char **units = MHI_TAKE(arena, const char *, c->face.width);
     for (int32_t i = 0; i < c->face.width && units != NULL; i++) {
-        const int32_t slides = c->signal == MHI_SIGNAL_Q && !d->coordinates[i].rotational;
-        units[i] = slides ? "m" : signal->unit;
+        const int32_t of_q = c->signal == MHI_SIGNAL_Q || c->signal == MHI_SIGNAL_QDOT;
+        const int32_t slides = of_q && !d->coordinates[i].rotational;
+        units[i] = !slides ? signal->unit : c->signal == MHI_SIGNAL_Q ? "m" : "m/s";
     }
     c->face.units = units;
     return units == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
@@ -131,8 +132,10 @@ mhe_status mhi_channels_create(const mhi_run *run, const mhi_ocp *ocp, const mhe
                                 {"emg", control, 0, MHI_TRUST_RAILS, MHE_GAP_HOLD, 1,
                                  run->data.emg_delay, p->n_muscles, 1, p->muscle_names},
                                 {"angles", MHI_SIGNAL_Q, 1, MHI_TRUST_ALL, MHE_GAP_LINEAR, 2, 0,
+                                 p->n_q, 1, p->coordinate_names},
+                                {"rates", MHI_SIGNAL_QDOT, 0, MHI_TRUST_ALL, MHE_GAP_LINEAR, 2, 0,
                                  p->n_q, 1, p->coordinate_names}};
-    const int32_t n_targets = (int32_t)(sizeof setups / sizeof setups[0]);
+    const int32_t n_targets = (int32_t)(sizeof setups / sizeof setups[0]) - !run->data.rates;
     int32_t n = n_targets;
     for (int32_t b = 0; b < p->layout->n_blocks; b++) {
         n += is_measured(ocp, mhe_layout_at(p->layout, b));

@@ -17,8 +17,11 @@
 #include "estimator/feed.h"
 #include "estimator/output.h"
 #include "estimator/pace.h"
+#include "estimator/rates.h"
+#include "estimator/tasks.h"
 #include "estimator/trust.h"
 #include "estimator/window.h"
+#include "model/joints.h"
 
 #include <math.h>
 #include <mhe/config.h>
@@ -34,6 +37,9 @@ struct mhe_estimator {
     mhe_description *owned_description; /* NULL where it was lent */
     const mhe_description *description;
     mhi_system *system;
+    mhi_reactions *reactions; /* NULL: not wanted */
+    const char **joint_names; /* [n_bodies] */
+    const mhi_tasks *tasks;   /* data.marker_weights; NULL: none */
     mhi_ocp *ocp;
     const mhe_solver_ops *solver;
     void *solver_self;
@@ -49,6 +55,7 @@ struct mhe_estimator {
     mhi_trust trust;
     mhi_window window;
     mhi_begin begin;
+    mhi_rates rates;
     mhi_pace pace;
     mhi_output output;
     const double **given; /* [channels] what the frame in work says, scratch */

@@ -3,15 +3,25 @@
 
 #include <string.h>
 
-mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_k,
+mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_k, int32_t n_joints,
                              const mhi_channels *channels, mhi_arena *arena, mhe_error *err) {
     const int32_t n_q = system->n_q, n_m = system->n_m;
     struct {
         double **array;
         int32_t n;
-    } wanted[] = {{&o->x, system->n_x},  {&o->u, system->n_u},  {&o->q, n_q},     {&o->v, n_q},
-                  {&o->activation, n_m}, {&o->excitation, n_m}, {&o->force, n_m}, {&o->moment, n_q},
-                  {&o->residual, n_q},   {&o->marker, 3 * n_k}};
+    } wanted[] = {{&o->x, system->n_x},
+                  {&o->u, system->n_u},
+                  {&o->held, system->n_u},
+                  {&o->q, n_q},
+                  {&o->v, n_q},
+                  {&o->activation, n_m},
+                  {&o->excitation, n_m},
+                  {&o->force, n_m},
+                  {&o->moment, n_q},
+                  {&o->reaction, 6 * n_joints},
+                  {&o->input, system->n_w},
+                  {&o->residual, n_q},
+                  {&o->marker, 3 * n_k}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
         if (*wanted[i].array == NULL) {
@@ -38,8 +48,9 @@ mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_
     return MHE_OK;
 }
 
-/* The signal in the estimate. */
-static const double *estimated(const mhi_output *o, int32_t signal) {
+/* The signal in the estimate; activations are controls where muscles are not `driven` by
+ * excitations, and what is compared is what was held from the node on. */
+static const double *estimated(const mhi_output *o, int32_t signal, int32_t driven) {
     switch (signal) {
     case MHI_SIGNAL_MARKERS:
         return o->marker;
@@ -48,7 +59,7 @@ static const double *estimated(const mhi_output *o, int32_t signal) {
     case MHI_SIGNAL_QDOT:
         return o->v;
     case MHI_SIGNAL_ACTIVATION:
-        return o->activation;
+        return driven ? o->activation : o->excitation;
     case MHI_SIGNAL_EXCITATION:
         return o->excitation;
     case MHI_SIGNAL_MUSCLE_FORCE:
@@ -65,6 +76,7 @@ static void give_tracked(mhe_estimator *e, int32_t i, int32_t k, int32_t control
     const mhi_channel *c = &e->channels.rows[i];
     const int32_t width = c->face.width;
     const int32_t of_control = c->signal >= 0 && mhi_ocp_signals(e->ocp)->signal[c->signal].reads_u;
+    const int32_t driven = mhi_ocp_control(e->ocp) == MHI_SIGNAL_EXCITATION;
     const ptrdiff_t at = (ptrdiff_t)(of_control ? controls : k) * width;
     const size_t bytes = sizeof(double) * (size_t)width;
     mhi_output_row *r = &e->output.rows[i];
@@ -77,8 +89,8 @@ static void give_tracked(mhe_estimator *e, int32_t i, int32_t k, int32_t control
                        .why = r->why,
                        .estimated = r->estimated};
     memcpy(r->measured, c->measured + at, bytes);
-    memcpy(r->estimated, c->signal < 0 ? c->measured + at : estimated(&e->output, c->signal),
-           bytes);
+    memcpy(r->estimated,
+           c->signal < 0 ? c->measured + at : estimated(&e->output, c->signal, driven), bytes);
     for (int32_t j = 0; j < width; j++) {
         const int32_t why = c->why[at + j];
         r->why[j] = why == MHE_TRACK_USED && !c->read ? MHE_TRACK_UNREAD : why;
@@ -90,12 +102,25 @@ static void give_tracked(mhe_estimator *e, int32_t i, int32_t k, int32_t control
     t->rms = mhi_rms_distance(r->estimated, r->measured, width, c->face.per_label);
 }
 
+/* Controls at the time of node k [n_u]. They are held over intervals, each as large as it should be
+ * in the interval's middle: at a node the mean of both sides, where both are known. */
+static void hold(mhe_estimator *e, int32_t k, int32_t controls) {
+    const double *after = mhi_row(e->window.solution.u, controls, e->n_u);
+    const double *before = k > 0                ? mhi_row(e->window.solution.u, k - 1, e->n_u)
+                           : e->window.has_left ? e->window.left_u
+                                                : after;
+    for (int32_t i = 0; i < e->n_u; i++) {
+        e->output.held[i] = 0.5 * (before[i] + after[i]);
+    }
+}
+
 /* States and controls of node k, and the muscles there. */
 static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe_error *err) {
     mhi_output *o = &e->output;
     const double *x = mhi_row(e->window.solution.x, k, e->window.n_x);
     const double *u = mhi_row(e->window.solution.u, controls, e->n_u);
-    const double *a = mhi_system_activation(e->system, x, u);
+    hold(e, k, controls);
+    const double *a = mhi_system_activation(e->system, x, o->held);
     const size_t n_q = sizeof(double) * (size_t)e->n_q, n_m = sizeof(double) * (size_t)e->n_m;
     memcpy(o->x, x, sizeof(double) * (size_t)e->n_x);
     memcpy(o->u, u, sizeof(double) * (size_t)e->n_u);
@@ -103,11 +128,12 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
     memcpy(o->v, x + e->n_q, n_q);
     memcpy(o->activation, a, n_m);
     memcpy(o->excitation, u, n_m);
-    memcpy(o->residual, u + e->n_m, sizeof(double) * (size_t)e->n_r);
+    memcpy(o->residual, o->held + e->n_m,
+           sizeof(double) * (size_t)mhi_ocp_problem(e->ocp)->n_residual_torques);
     mhi_muscle_state muscles;
     mhi_system_context *context = mhi_ocp_context(e->ocp);
     mhe_system_point at;
-    mhi_system_point(e->system, x, u, NULL, &at);
+    mhi_system_point(e->system, x, o->held, NULL, &at);
     mhe_status status = mhi_system_muscles(context, &at, 0, &muscles, err);
     if (status == MHE_OK) {
         memcpy(o->force, muscles.force, n_m);
@@ -115,6 +141,31 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
         status = mhi_system_markers(context, x, o->marker, NULL, err);
     }
     return status;
+}
+
+/* Inputs of forces at the time of node k. */
+static const double *give_inputs(mhe_estimator *e, int32_t k) {
+    const int32_t n_w = mhi_system_face(e->system)->n_w;
+    if (n_w == 0) {
+        return NULL;
+    }
+    memcpy(e->output.input, mhi_ocp_input(e->ocp, k), sizeof(double) * (size_t)n_w);
+    (void)mhi_system_inputs(e->system, e->window.times[k], e->output.input, NULL);
+    return e->output.input;
+}
+
+/* What joints transmit at node k, with the controls and the loads of its time. NaN: no answer. */
+static void give_reactions(mhe_estimator *e) {
+    mhi_output *o = &e->output;
+    const int32_t n_w = mhi_system_face(e->system)->n_w;
+    mhe_system_point at;
+    mhi_system_point(e->system, o->x, o->held, n_w > 0 ? o->input : NULL, &at);
+    if (mhi_reactions_solve(e->reactions, mhi_ocp_context(e->ocp), &at, e->run->output.reactions,
+                            o->reaction, NULL) != MHE_OK) {
+        for (int32_t i = 0; i < 6 * e->description->n_bodies; i++) {
+            o->reaction[i] = NAN;
+        }
+    }
 }
 
 mhe_status mhi_output_give(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_error *err) {
@@ -143,6 +194,11 @@ mhe_status mhi_output_give(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_e
     out->n_tracked = e->channels.n;
     out->tracked_size = sizeof(mhe_tracked);
     out->tracked = o->tracked;
+    out->inputs = give_inputs(e, k);
+    if (e->reactions != NULL) {
+        give_reactions(e);
+        out->reactions = o->reaction;
+    }
     out->layout = mhi_ocp_problem(e->ocp)->layout;
     out->states = o->x;
     out->controls = o->u;

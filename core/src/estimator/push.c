@@ -116,6 +116,26 @@ static mhe_status find_node(mhe_estimator *e, double time, int32_t *used, mhe_er
     return MHE_OK;
 }
 
+/* The velocities that the newest node's markers say. The posture is looked for near the last one,
+ * at first near what the model stands at. */
+static void take_rates(mhe_estimator *e, int32_t k) {
+    const mhi_channel *markers = mhi_channels_find(&e->channels, MHI_SIGNAL_MARKERS);
+    mhi_channel *rates = mhi_channels_find(&e->channels, MHI_SIGNAL_QDOT);
+    if (rates == NULL) {
+        return;
+    }
+    double *near = e->begin.near;
+    for (int32_t i = 0; i < e->n_q; i++) {
+        near[i] = e->window.solved > 0    ? e->output.q[i]
+                  : !isnan(e->begin.q[i]) ? e->begin.q[i]
+                                          : e->description->coordinates[i].value;
+    }
+    mhi_pace_postures(e, 1);
+    mhi_rates_take(&e->rates, k, e->window.times, mhi_row(markers->believed, k, 3 * e->n_k), near,
+                   e->trust.outlier, rates);
+    mhi_pace_postures(e, 0);
+}
+
 /* A frame's measurements, to the newest node where the frame is one. */
 static void take_frame(mhe_estimator *e, const mhe_frame *frame, int32_t used) {
     const mhi_channels *channels = &e->channels;
@@ -135,6 +155,7 @@ static void take_frame(mhe_estimator *e, const mhe_frame *frame, int32_t used) {
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_trust_drop(&e->trust, &channels->rows[i], e->window.filled - 1);
     }
+    take_rates(e, e->window.filled - 1);
 }
 
 /* The full window's estimate. `*ready` 0: it cannot be solved yet. */

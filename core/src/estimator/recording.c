@@ -4,11 +4,28 @@
 #include "base/pi.h"
 #include "believe/believe.h"
 #include "estimator/marker_unit.h"
+#include "estimator/tasks.h"
 #include "io/motion_file.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* Markers of weight 0 are as if never measured: neither they nor their distances say anything. */
+static mhe_status leave_out(mhi_recording *r, const mhi_run *run, const mhe_description *d,
+                            mhe_error *err) {
+    mhi_arena arena = {0};
+    const mhi_tasks *tasks = NULL;
+    const mhe_status status = mhi_tasks_read(run, d, NULL, &arena, &tasks, err);
+    const ptrdiff_t n = (ptrdiff_t)r->n_frames * 3 * d->n_markers;
+    for (ptrdiff_t i = 0; i < n && tasks != NULL; i++) {
+        if (tasks->marker[i / 3 % d->n_markers] == 0) {
+            r->markers[i] = NAN;
+        }
+    }
+    mhi_arena_free(&arena);
+    return status;
+}
 
 static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_description *d,
                                const mhe_host *host, mhe_error *err) {
@@ -39,6 +56,9 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
         for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * d->n_markers; i++) {
             mhi_run_transform(run, 1, r->markers + 3 * i);
         }
+    }
+    if (status == MHE_OK) {
+        status = leave_out(r, run, d, err);
     }
     free(names);
     mhi_table_free(table);
@@ -222,6 +242,7 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     }
     if (status == MHE_OK) {
         mhi_believe_markers(run, d, r, &r->findings);
+        status = mhi_believe_loads(run, d, r, &r->findings, err);
         mhi_findings_tell(&r->findings, told_from, told);
     }
     if (status == MHE_OK && run->data.reference != NULL) {

@@ -13,6 +13,7 @@
 struct mhi_start {
     const mhe_description *description;
     mhi_system_context *context;
+    const mhi_tasks *tasks; /* NULL: none */
     int32_t n_q, n_k;
     double *marker, *marker_q; /* [3 n_k], [3 n_k x n_q] */
     double *normal, *step;     /* [n_q x n_q], [n_q] */
@@ -50,6 +51,10 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
     return MHE_OK;
 }
 
+void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks) {
+    start->tasks = tasks;
+}
+
 void mhi_start_free(mhi_start *start) {
     if (start != NULL) {
         mhi_arena arena = start->arena;
@@ -57,36 +62,54 @@ void mhi_start_free(mhi_start *start) {
     }
 }
 
-/* Sum of squared distances at q over the markers that are there, their number in *n; with the
- * normal equations when `linearise` is set. */
+/* A sum of squares: as it is minimised, and of the markers' distances alone. */
+typedef struct sums {
+    double weighted, plain;
+    int32_t n; /* single coordinates of markers that are there */
+} sums;
+
+static void add_coordinates(mhi_start *s, const double *q, int linearise, sums *sum) {
+    for (int32_t i = 0; i < s->n_q && s->tasks != NULL; i++) {
+        const double weight = s->tasks->coordinate[i], r = q[i] - s->tasks->value[i];
+        sum->weighted += weight * r * r;
+        if (linearise) {
+            s->gradient[i] += weight * r;
+            s->normal[i * s->n_q + i] += weight;
+        }
+    }
+}
+
+/* Over the markers that are there; with the normal equations when `linearise` is set. */
 static mhe_status distances(mhi_start *s, const double *measured, const double *q, int linearise,
-                            double *squares, int32_t *n, mhe_error *err) {
+                            sums *sum, mhe_error *err) {
     mhe_status status =
         mhi_system_markers(s->context, q, s->marker, linearise ? s->marker_q : NULL, err);
     if (status != MHE_OK) {
         return status;
     }
-    *squares = 0;
-    *n = 0;
+    *sum = (sums){0};
     if (linearise) {
         memset(s->normal, 0, sizeof(double) * (size_t)(s->n_q * s->n_q));
         memset(s->gradient, 0, sizeof(double) * (size_t)s->n_q);
     }
     for (int32_t i = 0; i < 3 * s->n_k; i++) {
         const double r = s->marker[i] - measured[i];
-        if (isnan(r)) {
+        const double weight = s->tasks == NULL ? 1 : s->tasks->marker[i / 3];
+        if (isnan(r) || weight == 0) {
             continue;
         }
-        *squares += r * r;
-        *n += 1;
+        sum->weighted += weight * r * r;
+        sum->plain += r * r;
+        sum->n += 1;
         const double *row = s->marker_q + i * s->n_q;
         for (int32_t a = 0; a < s->n_q && linearise; a++) {
-            s->gradient[a] += row[a] * r;
+            s->gradient[a] += weight * row[a] * r;
             for (int32_t b = 0; b < s->n_q; b++) {
-                s->normal[a * s->n_q + b] += row[a] * row[b];
+                s->normal[a * s->n_q + b] += weight * row[a] * row[b];
             }
         }
     }
+    add_coordinates(s, q, linearise, sum);
     return MHE_OK;
 }
 
@@ -120,14 +143,14 @@ static double propose(mhi_start *s, const double *q, double damping) {
 
 mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, double *rms,
                              mhe_error *err) {
-    double damping = 1e-3, squares = 0;
-    int32_t n = 0;
+    double damping = 1e-3;
+    sums here = {0}, there = {0};
     for (int32_t i = 0; i < s->n_q; i++) {
         q[i] = clip(&s->description->coordinates[i], q[i]);
     }
     for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
-        mhe_status status = distances(s, measured, q, 1, &squares, &n, err);
-        if (status != MHE_OK || n == 0) {
+        mhe_status status = distances(s, measured, q, 1, &here, err);
+        if (status != MHE_OK || here.n == 0) {
             *rms = NAN;
             return status;
         }
@@ -135,11 +158,10 @@ mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, do
         if (length < 1e-9 || mhi_system_context_spent(s->context)) {
             break;
         }
-        double trial_squares = 0;
-        status = distances(s, measured, s->trial, 0, &trial_squares, &n, err);
-        if (status == MHE_OK && trial_squares <= squares) {
+        status = distances(s, measured, s->trial, 0, &there, err);
+        if (status == MHE_OK && there.weighted <= here.weighted) {
             memcpy(q, s->trial, sizeof(double) * (size_t)s->n_q);
-            squares = trial_squares;
+            here = there;
             damping = fmax(damping / 5, 1e-9);
         } else if (damping > 1e6) {
             break;
@@ -147,7 +169,7 @@ mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, do
             damping *= 8;
         }
     }
-    *rms = sqrt(3 * squares / n); /* n counts single coordinates of markers */
+    *rms = sqrt(3 * here.plain / here.n);
     return MHE_OK;
 }
 

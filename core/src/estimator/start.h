@@ -4,11 +4,14 @@
 #define MHI_START_H
 
 #include "model/system.h"
+#include "ocp/tasks.h"
 
 typedef struct mhi_start mhi_start;
 
 mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *context,
                             mhi_start **start, mhe_error *err);
+/* What single markers and coordinates count; NULL, as at first: all markers the same. Lent. */
+void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks);
 void mhi_start_free(mhi_start *start);
 
 /* Least-squares posture q [n_q] within the coordinate ranges for markers [n_k x 3] (NaN: missing),

@@ -17,6 +17,7 @@ mhe_status mhi_window_create(mhi_window *w, int32_t n, int32_t n_x, int32_t n_u,
                   {&w->solution.zx_upper, (n + 1) * n_x},
                   {&w->solution.zu_lower, n * n_u},
                   {&w->solution.zu_upper, n * n_u},
+                  {&w->left_u, n_u},
                   {&w->guess_x, (n + 1) * n_x},
                   {&w->guess_u, n * n_u},
                   {&w->prior_centre, n_x},
@@ -51,8 +52,9 @@ void mhi_window_skip(mhe_estimator *e, double time) {
 }
 
 void mhi_window_clear(mhe_estimator *e) {
-    e->window.filled = e->window.prepared = 0;
+    e->window.filled = e->window.prepared = e->window.has_left = 0;
     mhi_trust_clear(&e->trust);
+    mhi_rates_clear(&e->rates);
     mhi_begin_forget(&e->begin);
     mhi_phase_on(e, MHI_EVENT_EMPTIED);
 }
@@ -131,12 +133,15 @@ void mhi_window_advance(mhe_estimator *e) {
     mhe_solution *s = &w->solution;
     const int32_t n = w->n;
     mhi_channels_shift(&e->channels, w->filled);
+    mhi_rates_shift(&e->rates);
     shift_rows(w->times, n + 1, 1);
     w->filled--;
     w->prepared = 0;
     shift_rows(s->x, n + 1, w->n_x);
     shift_rows(s->zx_lower, n + 1, w->n_x);
     shift_rows(s->zx_upper, n + 1, w->n_x);
+    memcpy(w->left_u, s->u, sizeof(double) * (size_t)w->n_u);
+    w->has_left = mhi_phase_begun(e);
     shift_rows(s->u, n, w->n_u);
     shift_rows(s->zu_lower, n, w->n_u);
     shift_rows(s->zu_upper, n, w->n_u);

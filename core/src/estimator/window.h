@@ -16,6 +16,8 @@ typedef struct mhi_window {
     int32_t solved;      /* windows so far */
     double *times;       /* [n+1] */
     mhe_solution solution;
+    double *left_u;                      /* [n_u] of the interval that was dropped last */
+    int32_t has_left;                    /* it leads to node 0 */
     double *guess_x, *guess_u;           /* what the last solve started from */
     double *prior_centre, *prior_weight; /* [n_x], of an unsettled window's proximal term */
 } mhi_window;

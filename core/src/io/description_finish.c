@@ -111,22 +111,10 @@ static double *locked_at(mhi_builder *b, const mhe_description *d, const int32_t
     return at;
 }
 
-/* What stands in the description but no plugin carries yet: whoever stops at what is unsupported
- * must not lose it in silence. Actuators do nothing unless they are driven. */
-static void note_uncarried(mhi_builder *b, const mhe_description *d) {
-    if (d->n_bushings > 0) {
-        mhi_build_unsupported(b, 0, "%d BushingForce%s: what it pulls is missing",
-                              (int)d->n_bushings, d->n_bushings == 1 ? "" : "s");
-    }
-    if (d->n_loops > 0) {
-        mhi_build_unsupported(
-            b, 0, "%d loop%s (PointConstraint, WeldConstraint) that nothing holds together",
-            (int)d->n_loops, d->n_loops == 1 ? "" : "s");
-    }
+/* Actuators do nothing unless they are driven. */
+static void note_undriven(mhi_builder *b, const mhe_description *d) {
     if (d->n_actuators > 0) {
-        mhi_build_dropped(b, 0,
-                          "%d actuator%s, not driven; residual torques do that work where "
-                          "bounds.residual_torques asks for them",
+        mhi_build_dropped(b, 0, "%d actuator%s, driven only where bounds.actuators asks for it",
                           (int)d->n_actuators, d->n_actuators == 1 ? "" : "s");
     }
 }
@@ -163,7 +151,7 @@ static void build(mhi_builder *b, mhe_description *d, double **at) {
     }
     if (b->status == MHE_OK) {
         *at = locked_at(b, d, places.coordinate);
-        note_uncarried(b, d);
+        note_undriven(b, d);
         describe(b, d);
     }
 }

@@ -177,11 +177,6 @@ static void read_file_curve(mhi_osim *o, xmlNode *node, const char *tag, mhe_fun
                           tag);
 }
 
-static void read_file_curves(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
-    read_file_curve(o, node, "active_force_length_curve", &m->active_force_length, m->name);
-    read_file_curve(o, node, "passive_force_length_curve", &m->passive_force_length, m->name);
-}
-
 /* Schutte's activation: rate (e - a)(k1 e + k2) / time_scale rising, (e - a) k2 / time_scale
  * falling: time constants at full excitation and of the decay. */
 static void read_schutte(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
@@ -201,12 +196,16 @@ static void read_schutte(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
     m->deactivation_time = scale / k2;
     m->fiber_damping = damping;
     m->max_contraction_velocity = 1 / scale;
-    read_file_curves(o, node, m);
+    read_file_curve(o, node, "active_force_length_curve", &m->active_force_length, m->name);
+    /* without one OpenSim takes an exponential, and so does the muscle plugin */
+    (void)mhi_osim_function_of(o, node, "passive_force_length_curve", m->name,
+                               &m->passive_force_length);
     read_file_curve(o, node, "tendon_force_length_curve", &m->tendon_force_length, m->name);
 }
 
 static void read_rigid(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
-    read_file_curves(o, node, m);
+    read_file_curve(o, node, "active_force_length_curve", &m->active_force_length, m->name);
+    read_file_curve(o, node, "passive_force_length_curve", &m->passive_force_length, m->name);
     read_file_curve(o, node, "force_velocity_curve", &m->force_velocity, m->name);
 }
 

@@ -21,6 +21,7 @@ static mhe_status bad(const mhi_force *f, mhe_error *err, const char *what, int3
 static mhe_status check_layout(const mhi_force *f, const mhi_system *s, mhe_error *err) {
     const mhe_force_layout *l = &f->layout;
     if (l->n_inputs < 0 || l->n_paths < 0 || l->n_loads < 0 || l->n_parameters < 0 ||
+        l->n_pairs < 0 || (l->n_pairs > 0 && l->pairs == NULL) ||
         (l->n_inputs > 0 && (l->input_names == NULL || l->input_units == NULL)) ||
         (l->n_paths > 0 && l->paths == NULL) || (l->n_loads > 0 && l->loads == NULL) ||
         (l->n_parameters > 0 && l->parameter_names == NULL)) {
@@ -41,7 +42,13 @@ static mhe_status check_layout(const mhi_force *f, const mhi_system *s, mhe_erro
             }
         }
     }
-    return l->n_loads > 0 && s->model->loads == NULL
+    for (int32_t i = 0; i < 2 * l->n_pairs; i++) {
+        const int32_t body = l->pairs[i / 2].body[i % 2];
+        if (body < -1 || body >= s->description->n_bodies) {
+            return bad(f, err, "body", body, s->description->n_bodies - 1);
+        }
+    }
+    return (l->n_loads > 0 || l->n_pairs > 0) && s->model->loads == NULL
                ? mhe_fail(err, MHE_E_UNSUPPORTED, "%s: the model cannot load bodies", f->plugin->id)
                : MHE_OK;
 }
@@ -78,7 +85,7 @@ static mhe_status create_one(mhi_system *s, const mhi_force_setup *setup, mhi_fo
 }
 
 static int32_t acts(const mhe_force_layout *l) {
-    return l->generalised || l->n_paths > 0 || l->n_loads > 0;
+    return l->generalised || l->n_paths > 0 || l->n_loads > 0 || l->n_pairs > 0;
 }
 
 /* "forces.<position>: " before what a plugin says. */
@@ -115,6 +122,7 @@ mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_e
             s->face.n_w += f->layout.n_inputs;
             s->most_paths = larger(s->most_paths, f->layout.n_paths);
             s->most_loads = larger(s->most_loads, f->layout.n_loads);
+            s->most_pairs = larger(s->most_pairs, f->layout.n_pairs);
         }
     }
     return status;
@@ -203,6 +211,8 @@ static mhe_status evaluate_one(mhi_system_context *c, const mhi_force *f,
                                    .v = at->v,
                                    .length = c->t_length,
                                    .velocity = c->t_velocity,
+                                   .deflection = c->deflection,
+                                   .deflection_rate = c->deflection_rate,
                                    .input = l->n_inputs > 0 ? at->w + f->first_input : NULL};
     mhe_force_values out = {.size = sizeof out};
     if (l->generalised) {
@@ -225,21 +235,34 @@ static mhe_status evaluate_one(mhi_system_context *c, const mhi_force *f,
         out.load = c->load;
         zero(c->load, 9 * l->n_loads);
     }
+    if (l->n_pairs > 0) {
+        out.push = c->push;
+        out.push_d = derivatives ? c->push_d : NULL;
+        out.push_w = derivatives ? c->push_w : NULL;
+        zero(c->push, 6 * l->n_pairs);
+        zero(c->push_d, 36 * l->n_pairs);
+        zero(c->push_w, 36 * l->n_pairs);
+    }
     if (l->n_inputs > 0 && at->w == NULL) {
         return mhe_fail(err, MHE_E_INPUT, "%s: no inputs are known here", f->plugin->id);
     }
-    mhe_status status = f->ops->evaluate(f->self, &point, &out, err);
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < l->n_pairs && status == MHE_OK; i++) {
+        status = mhi_pairs_place(c, &l->pairs[i], at->v, i, err);
+    }
+    status = status == MHE_OK ? f->ops->evaluate(f->self, &point, &out, err) : status;
     const int finite = (!l->generalised || mhi_all_finite(c->own, n_q)) &&
                        mhi_all_finite(c->tension, l->n_paths) &&
-                       mhi_all_finite(c->load, 9 * l->n_loads);
+                       mhi_all_finite(c->load, 9 * l->n_loads) &&
+                       mhi_all_finite(c->push, 6 * l->n_pairs);
     return status == MHE_OK && !finite
                ? mhe_fail(err, MHE_RETRY, "%s: a force is not finite", f->plugin->id)
                : status;
 }
 
 /* Adds what it does to the whole. */
-static mhe_status add_one(mhi_system_context *c, const mhi_force *f, int32_t derivatives,
-                          mhe_error *err) {
+static mhe_status add_one(mhi_system_context *c, const mhi_force *f, const double *v,
+                          int32_t derivatives, mhe_error *err) {
     const mhe_force_layout *l = &f->layout;
     const int32_t n_q = c->system->face.n_q;
     if (l->generalised) {
@@ -255,8 +278,12 @@ static mhe_status add_one(mhi_system_context *c, const mhi_force *f, int32_t der
                                         c->other_v);
         }
     }
-    return l->n_loads == 0
-               ? MHE_OK
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < l->n_pairs && status == MHE_OK; i++) {
+        status = mhi_pairs_push(c, &l->pairs[i], v, i, derivatives, err);
+    }
+    return l->n_loads == 0 || status != MHE_OK
+               ? status
                : c->system->model->loads(c->model, l->loads, l->n_loads, c->load, c->other,
                                          derivatives ? c->other_q : NULL, NULL, err);
 }
@@ -272,7 +299,24 @@ mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at
     for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
         status = evaluate_one(c, &s->forces[i], at, derivatives, err);
         if (status == MHE_OK) {
-            status = add_one(c, &s->forces[i], derivatives, err);
+            status = add_one(c, &s->forces[i], at->v, derivatives, err);
+        }
+    }
+    return status;
+}
+
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
+                           mhi_force_loads *loads, void *data, mhe_error *err) {
+    const mhi_system *s = c->system;
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
+        const mhe_force_layout *l = &s->forces[i].layout;
+        status = evaluate_one(c, &s->forces[i], at, 0, err);
+        for (int32_t k = 0; k < l->n_paths && status == MHE_OK; k++) {
+            tension[l->paths[k]] += c->tension[k];
+        }
+        if (status == MHE_OK && l->n_loads > 0) {
+            status = loads(data, l->loads, l->n_loads, c->load, err);
         }
     }
     return status;
@@ -295,8 +339,10 @@ mhe_status mhi_forces_check(mhi_system *s, mhe_error *err) {
     mhe_status status = mhi_system_context_create(s, &c, err);
     const mhe_system_point at = {.size = sizeof at, .q = q, .v = v, .w = w};
     if (status == MHE_OK) {
-        const mhe_kinematics out = {
-            .size = sizeof out, .length = c->length, .length_q = c->length_q};
+        const mhe_kinematics out = {.size = sizeof out,
+                                    .length = c->length,
+                                    .length_q = c->length_q,
+                                    .body = s->most_pairs > 0 ? c->body : NULL};
         status = s->model->kinematics(c->model, q, v, &out, err);
     }
     for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {

@@ -2,10 +2,12 @@
 /* system.h: the musculoskeletal system = skeleton (model plugin) + muscles (muscle plugin) + other
  * forces (force plugins) + residual torques.
  *
- *     M(q) vdot = r - L_q(q)^T F(s, L(q), Ldot) + tau(q, v, w) - bias(q, v),     Ldot = L_q v
+ *     M(q) vdot = r - L_q(q)^T F(s, L(q), Ldot) + tau(q, v, w) - bias(q, v) + G(q)^T lambda,
+ *     Ldot = L_q v
  *
- * s are the muscles' states, w the inputs of the forces. What the numbers of x, u, w are says the
- * layout (mhe/layout.h), which is made here and nowhere else. */
+ * s are the muscles' states, w the inputs of the forces. lambda is what keeps the loops of the
+ * description closed, found with the accelerations: see loops.c. What the numbers of x, u, w are
+ * says the layout (mhe/layout.h), which is made here and nowhere else. */
 #ifndef MHI_SYSTEM_H
 #define MHI_SYSTEM_H
 
@@ -42,6 +44,7 @@ typedef struct mhi_system_setup {
     const void *muscle_config;
     int32_t formulation;
     int32_t residual_torques; /* 0 or 1 */
+    int32_t actuators;        /* 1: the description's are controls */
     const mhi_force_setup *forces;
     int32_t n_forces;
     const mhi_bounds *bounds; /* NULL: none */
@@ -124,6 +127,24 @@ mhe_status mhi_system_equilibrium(mhi_system_context *context, const double *q, 
 /* Marker positions [n_k x 3] and, if not NULL, their Jacobian [3 n_k x n_q]. [hot] */
 mhe_status mhi_system_markers(mhi_system_context *context, const double *q, double *marker,
                               double *marker_q, mhe_error *err);
+
+/* Loops of the model, n_c rows as in mhe_loop_values; 0: it has none. */
+int32_t mhi_system_loop_rows(const mhi_system *system);
+/* At (q, v), see mhe_loop_values; valid until the context's next call, derivatives only where they
+ * were asked for. [hot] */
+typedef struct mhi_loop_state {
+    const double *gap, *rate;              /* [n_c] */
+    const double *gap_q, *rate_q, *rate_v; /* [n_c x n_q] */
+} mhi_loop_state;
+mhe_status mhi_system_gaps(mhi_system_context *context, const double *q, const double *v,
+                           int32_t derivatives, mhi_loop_state *out, mhe_error *err);
+/* The nearest posture q [n_q] in which the loops are closed, and then the nearest speeds v (may be
+ * NULL) that keep them so, both least squares of the change. MHE_RETRY: none found. [hot] */
+mhe_status mhi_system_close_loops(mhi_system_context *context, double *q, double *v,
+                                  mhe_error *err);
+/* What keeps them closed [n_c], N (N m), ground axes, on body 2: of the context's last
+ * acceleration. NULL: no loops. */
+const double *mhi_system_loop_force(const mhi_system_context *context);
 
 /* General bounds of all entries of a role, one behind the other. */
 void mhi_layout_bounds(const mhe_layout *layout, int32_t role, double *lower, double *upper);

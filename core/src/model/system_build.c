@@ -130,6 +130,13 @@ static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe
     if (status == MHE_OK) {
         status = mhi_forces_create(s, setup, err);
     }
+    if (status == MHE_OK) {
+        status = mhi_loops_prepare(s, err);
+    }
+    if (status == MHE_OK && setup->actuators) {
+        s->n_actuators = d->n_actuators;
+        status = mhi_actuators_check(s, err);
+    }
     return status == MHE_OK ? mhi_layout_make(s, setup, err) : status;
 }
 
@@ -197,11 +204,23 @@ const mhe_system *mhi_system_face(const mhi_system *s) {
     return &s->face;
 }
 
+/* Of a matrix of derivatives of accelerations, one for the closing of a posture. */
+static int32_t most_columns(const mhi_system *s) {
+    const int32_t of[] = {1, s->face.n_q, s->face.n_m, s->face.n_z, s->face.n_p, s->face.n_r};
+    int32_t most = 0;
+    for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+        most = of[i] > most ? of[i] : most;
+    }
+    return most;
+}
+
 static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
     const mhi_system *s = c->system;
     const int32_t n_q = s->face.n_q, n_m = s->face.n_m, n_p = s->n_paths, n_z = s->face.n_z;
     const int32_t n_p_all = s->n_parameters > 0 ? s->muscle_layout.n_parameters : 0;
     const int32_t n_s = n_m * s->n_s, other = s->n_forces > 0 ? n_q : 0, n_t = s->most_paths;
+    const int32_t n_c = s->n_c, wide = most_columns(s);
+    const int32_t n_f = s->most_pairs, per_pair = n_f > 0 ? n_q : 0;
     struct {
         double **array;
         int32_t n;
@@ -229,6 +248,7 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                   {&c->moment, n_q},
                   {&c->moment_q, n_q * n_q},
                   {&c->moment_v, n_q * n_q},
+                  {&c->solved, 3 * n_q * n_q},
                   {&c->tau_q, n_q * n_q},
                   {&c->tau_v, n_q * n_q},
                   {&c->other, other},
@@ -243,19 +263,47 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                   {&c->t_length, n_t},
                   {&c->t_velocity, n_t},
                   {&c->load, 9 * s->most_loads},
+                  {&c->body, n_f > 0 ? 12 * s->description->n_bodies : 0},
+                  {&c->deflection, 6 * n_f},
+                  {&c->deflection_rate, 6 * n_f},
+                  {&c->push, 6 * n_f},
+                  {&c->push_d, 36 * n_f},
+                  {&c->push_w, 36 * n_f},
+                  {&c->pair_rows, 6 * n_f * n_q},
+                  {&c->pair_loads, 36 * per_pair},
+                  {&c->pair_q, per_pair * n_q},
+                  {&c->pair_work, 18 * per_pair},
+                  {&c->pair_turn, 3 * per_pair},
                   {&c->row_q, n_q},
                   {&c->row_v, n_q},
                   {&c->all_force_p, n_p_all * n_m},
                   {&c->all_rate_p, n_p_all * n_s},
                   {&c->force_p, s->face.n_p},
-                  {&c->moment_p, n_q * s->face.n_p}};
+                  {&c->moment_p, n_q * s->face.n_p},
+                  {&c->drive, s->n_actuators > 0 ? n_q : 0},
+                  {&c->drive_q, s->n_actuators > 0 ? n_q * n_q : 0},
+                  {&c->drive_r, s->n_actuators * n_q},
+                  {&c->gap, n_c},
+                  {&c->gap_q, n_c * n_q},
+                  {&c->gap_rate, n_c},
+                  {&c->gap_rate_q, n_c * n_q},
+                  {&c->gap_rate_v, n_c * n_q},
+                  {&c->gap_acceleration, n_c},
+                  {&c->gap_acceleration_q, n_c * n_q},
+                  {&c->gap_acceleration_v, n_c * n_q},
+                  {&c->loop_force, n_c},
+                  {&c->loop_push, n_c * n_q},
+                  {&c->loop_factor, n_c * n_c},
+                  {&c->loop_value, 9 * s->n_loop_loads},
+                  {&c->loop_columns, n_c * wide}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         *wanted[i].array = MHI_TAKE(&c->arena, double, wanted[i].n);
         if (*wanted[i].array == NULL) {
             return mhe_fail(err, MHE_E_MEMORY, "out of memory");
         }
     }
-    return MHE_OK;
+    c->loop_order = MHI_TAKE(&c->arena, int32_t, n_c);
+    return c->loop_order == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
 }
 
 mhe_status mhi_system_context_create(const mhi_system *s, mhi_system_context **context,

@@ -23,6 +23,7 @@ typedef struct mhi_ocp_setup {
     const void *integrator_config;
     const mhi_term_setup *terms;
     int32_t n_terms;
+    const mhi_tasks *tasks; /* what single markers count; NULL: all 1. Lent */
     int32_t n_intervals;
     double interval;   /* s */
     int32_t n_workers; /* threads that may evaluate at the same time, >= 1 */

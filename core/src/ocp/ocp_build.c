@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* ocp_build.c: makes the problem: sizes, structure, plugins' instances, memory of each thread. */
+#include "ocp/loop_cost.h"
 #include "ocp/ocp_private.h"
 #include "plugin/instance.h"
 
@@ -64,7 +65,8 @@ static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err
     uint8_t *uu = MHI_TAKE(&ocp->arena, uint8_t, n_u * n_u);
     uint8_t *zz = MHI_TAKE(&ocp->arena, uint8_t, n_z * n_z);
     uint8_t *columns = MHI_TAKE(&ocp->arena, uint8_t, n_z);
-    if (!A || !B || !xx || !ux || !uu || !zz || !columns) {
+    ocp->reach = MHI_TAKE(&ocp->arena, int32_t, n_z);
+    if (!A || !B || !xx || !ux || !uu || !zz || !columns || !ocp->reach) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     dynamics_pattern(f, n_x, A, B);
@@ -76,6 +78,9 @@ static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err
         mhi_term_pattern(&ocp->terms[i], &ocp->signals, n_z, columns, zz);
     }
     for (int32_t a = 0; a < n_z; a++) {
+        while (ocp->reach[a] < a && !zz[a * n_z + ocp->reach[a]]) {
+            ocp->reach[a]++;
+        }
         for (int32_t b = 0; b < n_z; b++) {
             const uint8_t set = zz[a * n_z + b];
             const int32_t i = solver_column(ocp, a), j = solver_column(ocp, b);
@@ -156,6 +161,21 @@ static const char *marker_name(const mhe_description *d, int32_t i) {
     return d->markers[i].name;
 }
 
+/* "AC.x" .. "AC.z" of a point, "AC.rx" .. "AC.rz" of a weld's turning too; NULL: out of memory. */
+static const char **name_loops(mhi_ocp *ocp) {
+    const mhe_description *d = mhi_system_description(ocp->system);
+    const char **names = MHI_TAKE(&ocp->arena, const char *, mhe_loop_rows(d));
+    for (int32_t i = 0, row = 0; i < d->n_loops; i++) {
+        const int32_t rows = d->loops[i].kind == MHE_LOOP_WELD ? 6 : 3;
+        for (int32_t k = 0; k < rows && names != NULL; k++, row++) {
+            names[row] = mhi_arena_format(&ocp->arena, "%s.%s%c", d->loops[i].name,
+                                          k < 3 ? "" : "r", "xyz"[k % 3]);
+            names = names[row] == NULL ? NULL : names;
+        }
+    }
+    return names;
+}
+
 /* Of every signal; a marker has three. */
 static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
     const mhe_problem *p = &ocp->problem;
@@ -164,14 +184,20 @@ static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
         axes[i] = mhi_arena_format(&ocp->arena, "%s.%c", p->marker_names[i / 3], "xyz"[i % 3]);
         axes = axes[i] == NULL ? NULL : axes;
     }
+    const char **loops = name_loops(ocp);
+    const mhe_block *drive = mhe_layout_find(p->layout, MHE_ROLE_CONTROL, "actuator");
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         const int32_t of_muscles = i == MHI_SIGNAL_ACTIVATION || i == MHI_SIGNAL_EXCITATION ||
                                    i == MHI_SIGNAL_MUSCLE_FORCE;
+        const int32_t of_loops = i == MHI_SIGNAL_LOOP_GAP || i == MHI_SIGNAL_LOOP_RATE;
         ocp->entry_names[i] = i == MHI_SIGNAL_MARKERS ? axes
                               : of_muscles            ? p->muscle_names
-                                                      : p->coordinate_names;
+                              : of_loops              ? loops
+                              : i == MHI_SIGNAL_ACTUATOR
+                                  ? (drive != NULL ? drive->entry_names : NULL)
+                                  : p->coordinate_names;
     }
-    return axes == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    return axes == NULL || loops == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
 }
 
 static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
@@ -182,7 +208,7 @@ static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_erro
                        .n_q = d->n_coordinates,
                        .n_muscles = d->n_muscles,
                        .n_markers = d->n_markers,
-                       .n_residual_torques = mhi_system_face(setup->system)->n_r,
+                       .n_residual_torques = ocp->signals.signal[MHI_SIGNAL_RESIDUAL_TORQUE].n_y,
                        .n_intervals = setup->n_intervals,
                        .interval = setup->interval,
                        .data = ocp,
@@ -240,10 +266,12 @@ static mhe_status take_memory(mhi_ocp *ocp, mhe_error *err) {
 
 /* Term i, whose refusal begins with "costs.<i>: ". */
 static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t i, mhe_error *err) {
-    mhe_status status = mhi_term_create(setup->host, &setup->terms[i], &ocp->problem, &ocp->signals,
-                                        &ocp->arena, &ocp->terms[i], err);
+    const int32_t own = i >= setup->n_terms; /* of the loops */
+    const mhi_term_setup *term = own ? &mhi_loop_terms[i - setup->n_terms] : &setup->terms[i];
+    mhe_status status = mhi_term_create(setup->host, term, &ocp->problem, &ocp->signals,
+                                        setup->tasks, &ocp->arena, &ocp->terms[i], err);
     ocp->n_terms_created = i + 1;
-    if (status != MHE_OK && err != NULL) {
+    if (status != MHE_OK && err != NULL && !own) {
         const mhe_error why = *err;
         err->part = MHE_PART_COST;
         err->entry = i;
@@ -261,7 +289,7 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
     if (status == MHE_OK) {
         status = set_problem(ocp, setup, err);
     }
-    for (int32_t i = 0; i < setup->n_terms && status == MHE_OK; i++) {
+    for (int32_t i = 0; i < ocp->n_terms && status == MHE_OK; i++) {
         status = create_term(ocp, setup, i, err);
         if (status == MHE_OK) {
             ocp->wanted |= mhi_term_reads(&ocp->terms[i]);
@@ -313,7 +341,7 @@ mhe_status mhi_ocp_create(const mhi_ocp_setup *setup, mhi_ocp **result, mhe_erro
     ocp->n_x = f->n_x;
     ocp->n_w = f->n_w;
     ocp->integrator = setup->integrator->ops;
-    ocp->n_terms = setup->n_terms;
+    ocp->n_terms = setup->n_terms + (mhi_system_loop_rows(setup->system) > 0 ? MHI_LOOP_TERMS : 0);
     ocp->interval = setup->interval;
     mhe_status status = build(ocp, setup, err);
     if (status != MHE_OK) {

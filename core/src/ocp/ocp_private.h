@@ -39,6 +39,7 @@ struct mhi_ocp {
     double *times;   /* [N+1] */
     double *inputs;  /* [(N+1) x n_w] */
     int32_t n_w;
+    int32_t *reach; /* [n_z] first column that a row of the Hessian's lower triangle can have */
     double *prior_centre, *prior_weight; /* [n_x] */
     const char *const *entry_names[MHI_N_SIGNALS];
     double *memory;                    /* [N x memory_size] a ring, see interval_memory() */

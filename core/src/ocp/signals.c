@@ -17,6 +17,9 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     const int32_t qdot = mhe_layout_find(l, MHE_ROLE_STATE, "qdot")->first;
     const int32_t all = driven ? f->n_x : f->n_x + n_m; /* what muscles see is contiguous in z */
     const int32_t n_r = residual != NULL ? residual->count : 0;
+    const int32_t n_c = mhi_system_loop_rows(system);
+    const mhe_block *drive = mhe_layout_find(l, MHE_ROLE_CONTROL, "actuator");
+    const int32_t n_act = drive != NULL ? drive->count : 0;
     *signals = (mhi_signals){
         .signal = {
             [MHI_SIGNAL_MARKERS] = {"markers", "m", 3 * n_k, 0, 0, n_q, 0, 0, 1},
@@ -29,6 +32,10 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
             [MHI_SIGNAL_JOINT_MOMENT] = {"joint_moment", "N m", n_q, 0, 0, all, !driven, 0, 1},
             [MHI_SIGNAL_RESIDUAL_TORQUE] = {"residual_torque", "N m", n_r, 0,
                                             f->n_x + (n_r > 0 ? residual->first : 0), 0, 1, 0, 1},
+            [MHI_SIGNAL_LOOP_GAP] = {"loop_gap", "m", n_c, 0, 0, n_q, 0, 0, 1},
+            [MHI_SIGNAL_ACTUATOR] = {"actuator", "1", n_act, 0,
+                                     f->n_x + (n_act > 0 ? drive->first : 0), 0, 1, 0, 1},
+            [MHI_SIGNAL_LOOP_RATE] = {"loop_rate", "m/s", n_c, 0, 0, 2 * n_q, 0, 0, 1},
         }};
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         mhi_signal *s = &signals->signal[i];
@@ -133,6 +140,31 @@ static mhe_status muscle_signals(const mhi_signals *signals, const mhi_system *s
     return MHE_OK;
 }
 
+static mhe_status loop_signals(const mhi_signals *signals, const mhi_system *system,
+                               mhi_system_context *context, const double *x, double *y,
+                               double *jacobian, mhe_error *err) {
+    const mhi_signal *gap = &signals->signal[MHI_SIGNAL_LOOP_GAP];
+    const mhi_signal *rate = &signals->signal[MHI_SIGNAL_LOOP_RATE];
+    const int32_t n_q = mhi_system_face(system)->n_q, n_c = gap->n_y;
+    mhi_loop_state at;
+    mhe_status status = mhi_system_gaps(context, x, x + n_q, jacobian != NULL, &at, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    memcpy(y + gap->offset, at.gap, sizeof(double) * (size_t)n_c);
+    memcpy(y + rate->offset, at.rate, sizeof(double) * (size_t)n_c);
+    if (jacobian != NULL) {
+        const size_t row = sizeof(double) * (size_t)n_q;
+        memcpy(jacobian + gap->jacobian, at.gap_q, row * (size_t)n_c);
+        for (int32_t i = 0; i < n_c; i++) {
+            double *to = jacobian + rate->jacobian + 2 * i * n_q;
+            memcpy(to, at.rate_q + i * n_q, row);
+            memcpy(to + n_q, at.rate_v + i * n_q, row);
+        }
+    }
+    return MHE_OK;
+}
+
 mhe_status mhi_signals_evaluate(const mhi_signals *signals, const mhi_system *system,
                                 mhi_system_context *context, uint32_t wanted, const double *x,
                                 const double *u, double *y, double *jacobian, mhe_error *err) {
@@ -154,6 +186,10 @@ mhe_status mhi_signals_evaluate(const mhi_signals *signals, const mhi_system *sy
         const mhi_signal *s = &signals->signal[MHI_SIGNAL_MARKERS];
         status = mhi_system_markers(context, x, y + s->offset,
                                     jacobian == NULL ? NULL : jacobian + s->jacobian, err);
+    }
+    const uint32_t of_loops = 1u << MHI_SIGNAL_LOOP_GAP | 1u << MHI_SIGNAL_LOOP_RATE;
+    if (status == MHE_OK && (wanted & of_loops) != 0) {
+        status = loop_signals(signals, system, context, x, y, jacobian, err);
     }
     const uint32_t of_muscles = 1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT;
     const int known = u != NULL || !signals->signal[MHI_SIGNAL_MUSCLE_FORCE].reads_u;

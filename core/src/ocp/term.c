@@ -39,9 +39,27 @@ static mhe_status check_layout(mhi_term *t, mhi_signals *signals, mhe_error *err
     return MHE_OK;
 }
 
+/* Roots of what each entry counts. A cost that mixes entries in a residual is left as it is. */
+static mhe_status take_tasks(mhi_term *t, const mhi_tasks *tasks, const mhi_signals *signals,
+                             mhi_arena *arena, mhe_error *err) {
+    const int32_t first = signals->signal[MHI_SIGNAL_MARKERS].offset;
+    int32_t n = 0;
+    if (tasks == NULL || t->layout.jacobian != MHE_JACOBIAN_DIAGONAL) {
+        return MHE_OK;
+    }
+    t->root = MHI_TAKE(arena, double, t->ny);
+    for (int32_t j = 0; j < t->ny && t->root != NULL; j++) {
+        const int32_t of_marker = t->y_signal[j] % MHI_N_SIGNALS == MHI_SIGNAL_MARKERS;
+        t->root[j] = of_marker ? sqrt(tasks->marker[(t->y_target[j] - first) / 3]) : 1;
+        n += of_marker;
+    }
+    t->tasks = n > 0 ? tasks : NULL;
+    return t->root == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+}
+
 mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
-                           const mhe_problem *problem, mhi_signals *signals, mhi_arena *arena,
-                           mhi_term *t, mhe_error *err) {
+                           const mhe_problem *problem, mhi_signals *signals, const mhi_tasks *tasks,
+                           mhi_arena *arena, mhi_term *t, mhe_error *err) {
     *t = (mhi_term){.ops = setup->plugin->ops,
                     .id = setup->plugin->id,
                     .self = setup->config,
@@ -74,6 +92,10 @@ mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
             t->y_signal[j] = t->signals[s];
             t->y_at[j] = t->layout.at[s];
         }
+    }
+    status = take_tasks(t, tasks, signals, arena, err);
+    if (status != MHE_OK) {
+        return status;
     }
     t->differenced = t->ops->jacobian == NULL;
     if (t->differenced) {
@@ -116,7 +138,8 @@ uint32_t mhi_term_reads(const mhi_term *t) {
     for (int32_t i = 0; i < t->n_signals; i++) {
         reads |= 1u << t->signals[i] % MHI_N_SIGNALS;
     }
-    return reads;
+    const int32_t of_q = t->tasks != NULL && t->tasks->n_coordinates > 0;
+    return of_q ? reads | 1u << MHI_SIGNAL_Q : reads;
 }
 
 static void mark_columns(const mhi_signal *s, int32_t row, uint8_t *columns) {
@@ -184,6 +207,9 @@ static void add_row(const double *row, int32_t first, int32_t n, double r, doubl
     for (int32_t a = 0; a < n; a++) {
         const double scaled = scale * row[a];
         double *hessian = sum->hessian + (first + a) * n_z + first;
+        if (scaled == 0) { /* a marker moves with few coordinates */
+            continue;
+        }
         sum->gradient[first + a] += scaled * r;
         for (int32_t b = 0; b <= a; b++) {
             hessian[b] += scaled * row[b];
@@ -296,6 +322,31 @@ static void scale_jacobian(const mhi_term *t, mhi_term_workspace *w) {
     }
 }
 
+/* What tasks make of residuals and Jacobian. A coordinate's weighs as that of a marker in metres:
+ * with the square of the largest entry that a marker has there. */
+static void add_tasks(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
+                      const double *y, double scale, int32_t n_z, mhi_term_sum *sum) {
+    const mhi_signal *q = &signals->signal[MHI_SIGNAL_Q];
+    double of_marker = 0;
+    for (int32_t j = 0; j < t->ny; j++) {
+        if (t->y_signal[j] % MHI_N_SIGNALS == MHI_SIGNAL_MARKERS) {
+            of_marker = fmax(of_marker, fabs(w->jacobian[j]));
+        }
+        w->r[j] *= t->root[j];
+        w->jacobian[j] *= t->root[j];
+    }
+    for (int32_t i = 0; i < q->n_y && t->tasks->n_coordinates > 0; i++) {
+        const double weight = scale * of_marker * of_marker * t->tasks->coordinate[i];
+        const double r = y[q->offset + i] - t->tasks->value[i];
+        const int32_t c = q->column + i;
+        sum->cost += 0.5 * weight * r * r;
+        if (sum->gradient != NULL) {
+            sum->gradient[c] += weight * r;
+            sum->hessian[c * n_z + c] += weight;
+        }
+    }
+}
+
 /* Entries of the node before have its targets; those of the first node are missing at others. */
 static void gather_elsewhere(const mhi_term *t, mhi_term_workspace *w, int32_t node,
                              const double *before) {
@@ -306,6 +357,16 @@ static void gather_elsewhere(const mhi_term *t, mhi_term_workspace *w, int32_t n
             w->y[j] = w->y_ref[j] = NAN;
         }
     }
+}
+
+static mhe_status evaluate_jacobian(const mhi_term *t, mhi_term_workspace *w, mhe_stage *stage,
+                                    mhe_error *err) {
+    const int32_t n = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL ? t->ny : t->layout.n_res * t->ny;
+    if (t->differenced) {
+        return difference(t, w, stage, err);
+    }
+    memset(w->jacobian, 0, sizeof(double) * (size_t)n);
+    return t->ops->jacobian(t->self, stage, w->jacobian, err);
 }
 
 mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
@@ -331,22 +392,20 @@ mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_sign
     if (status != MHE_OK) {
         return status;
     }
-    const int robust = isfinite(t->limit);
+    const int robust = isfinite(t->limit), diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
     scale *= t->factor;
+    if (sum->gradient != NULL || t->tasks != NULL) {
+        status = evaluate_jacobian(t, w, &stage, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
+    if (t->tasks != NULL) {
+        add_tasks(t, w, signals, y, scale, n_z, sum);
+    }
     sum->cost += scale * (robust ? robust_loss(t, w) : 0.5 * squares_of(w->r, t->layout.n_res));
     if (sum->gradient == NULL) {
         return MHE_OK;
-    }
-    const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
-    if (t->differenced) {
-        status = difference(t, w, &stage, err);
-    } else {
-        const int32_t n = diagonal ? t->ny : t->layout.n_res * t->ny;
-        memset(w->jacobian, 0, sizeof(double) * (size_t)n);
-        status = t->ops->jacobian(t->self, &stage, w->jacobian, err);
-    }
-    if (status != MHE_OK) {
-        return status;
     }
     if (robust) {
         scale_jacobian(t, w);

@@ -6,6 +6,7 @@
 
 #include "base/arena.h"
 #include "ocp/signals.h"
+#include "ocp/tasks.h"
 
 #include <mhe/cost.h>
 
@@ -29,12 +30,14 @@ typedef struct mhi_term {
     int32_t n_signals;
     int32_t signals[MHE_COST_MAX_SIGNALS]; /* rows of the table of signals */
     int32_t ny;
-    int32_t *y_index;    /* [ny] place in the vector of all signals */
-    int32_t *y_target;   /* [ny] place of its target in the vector of targets */
-    int32_t *y_signal;   /* [ny] which row of the table */
-    int32_t *y_at;       /* [ny] MHE_AT_* */
-    int32_t elsewhere;   /* an entry is of another node than the one in work */
-    int32_t differenced; /* no jacobian(): central differences */
+    int32_t *y_index;       /* [ny] place in the vector of all signals */
+    int32_t *y_target;      /* [ny] place of its target in the vector of targets */
+    int32_t *y_signal;      /* [ny] which row of the table */
+    int32_t *y_at;          /* [ny] MHE_AT_* */
+    int32_t elsewhere;      /* an entry is of another node than the one in work */
+    int32_t differenced;    /* no jacobian(): central differences */
+    const mhi_tasks *tasks; /* it compares markers one by one, and these say what each counts */
+    double *root;           /* [ny] of the factors, where there are tasks */
 } mhi_term;
 
 /* Memory of one thread for one term. */
@@ -58,8 +61,8 @@ typedef struct mhi_term_sum {
 /* Creates the plugin's instance and lays it out. `problem` and `signals` must outlive the term.
  * [cold] */
 mhe_status mhi_term_create(const mhe_host *host, const mhi_term_setup *setup,
-                           const mhe_problem *problem, mhi_signals *signals, mhi_arena *arena,
-                           mhi_term *term, mhe_error *err);
+                           const mhe_problem *problem, mhi_signals *signals, const mhi_tasks *tasks,
+                           mhi_arena *arena, mhi_term *term, mhe_error *err);
 void mhi_term_destroy(mhi_term *term);
 mhe_status mhi_term_workspace_create(const mhi_term *term, int32_t n_z, mhi_arena *arena,
                                      mhi_term_workspace *workspace, mhe_error *err);

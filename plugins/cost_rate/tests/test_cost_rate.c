@@ -91,7 +91,7 @@ static double apart(const double *a, const double *b, int32_t n) {
     return sqrt(squares / n);
 }
 
-static const char *const rti = "{plugin: mhe.solver.rti, tolerance: 1e-7}";
+static const char *const rti = "{plugin: mhe.solver.rti, preset: robust, tolerance: 1e-7}";
 static const char *const ipopt = "{plugin: mhe.solver.ipopt}";
 static const char *const rate = ", {plugin: mhe.cost.rate, signal: joint_moment, weight: 0.3}";
 static outcome quiet, plain, smooth, by_ipopt; /* large */

@@ -141,8 +141,9 @@ static int follow(tally *t) {
                    "model: {file: $ARM19}\nmuscle: {curves: %s}\nformulation: %s\n"
                    "data: {emg: %s, reference: %s}\n"
                    "horizon: {window: 7, ratio: 3}\ncosts: [%s]\n"
-                   "integrator: {tolerance: 0}\n" /* steps that change would move F by 1e-6 */
-                   "solver: {plugin: mhe.solver.rti}\n",
+                   /* steps that change would move F by 1e-6 */
+                   "integrator: {stages: 4, max_step: 0.015, activation_step: 1.7, tolerance: 0}\n"
+                   "solver: {plugin: mhe.solver.rti, preset: robust}\n",
                    t->curves, t->formulation, path, path, t->cost);
     test_fixture f;
     if (test_fixture_open(&f, yaml) != MHE_OK) {
@@ -156,7 +157,8 @@ static int follow(tally *t) {
     mhi_estimator_set_start(f.estimator, r->reference.q, r->reference.qdot);
     contender rti, ipopt;
     const mhe_stage_problem *problem = mhi_ocp_face(f.ocp);
-    contender_open(&rti, problem, "mhe.solver.rti", "{tolerance: 1e-10, max_iterations: 200}");
+    contender_open(&rti, problem, "mhe.solver.rti",
+                   "{preset: robust, tolerance: 1e-10, max_iterations: 200}");
     contender_open(&ipopt, problem, "mhe.solver.ipopt",
                    "{tolerance: 1e-12, max_iterations: 200, acceptable_tolerance: 1e-9, "
                    "acceptable_iterations: 8}");

@@ -269,7 +269,7 @@ static void test_memory(void **state) {
 
 static void test_no_memory_taken(void **state) {
     (void)state;
-    static const char *const yaml[] = {"{}", "{preset: balanced}", "{preset: speed}"};
+    static const char *const yaml[] = {"{preset: robust}", "{preset: balanced}", "{preset: speed}"};
     static double target[8 * TOY_ARM_TARGET];
     for (int i = 0; i < 3; i++) {
         toy t;

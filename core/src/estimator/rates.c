@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "estimator/rates.h"
+
+#include <math.h>
+#include <string.h>
+
+mhe_status mhi_rates_create(mhi_rates *r, const mhi_run *run, const mhi_system *system,
+                            mhi_system_context *context, const mhi_tasks *tasks, int32_t nodes,
+                            mhi_arena *arena, mhe_error *err) {
+    const int32_t n_q = mhi_system_face(system)->n_q;
+    *r = (mhi_rates){.n_q = n_q, .nodes = nodes, .nearest = INFINITY};
+    if (!run->data.rates) {
+        return MHE_OK;
+    }
+    r->q = MHI_TAKE(arena, double, nodes *n_q);
+    r->found = MHI_TAKE(arena, double, n_q);
+    r->v = MHI_TAKE(arena, double, n_q);
+    if (r->q == NULL || r->found == NULL || r->v == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhi_rates_clear(r);
+    const mhe_status status = mhi_start_create(system, context, &r->start, err);
+    if (status == MHE_OK) {
+        mhi_start_set_tasks(r->start, tasks);
+    }
+    return status;
+}
+
+void mhi_rates_free(mhi_rates *r) {
+    mhi_start_free(r->start);
+}
+
+static double *posture(mhi_rates *r, int32_t k) {
+    return r->q + (ptrdiff_t)k * r->n_q;
+}
+
+static void forget(mhi_rates *r, int32_t k) {
+    for (int32_t i = 0; i < r->n_q; i++) {
+        posture(r, k)[i] = NAN;
+    }
+}
+
+void mhi_rates_clear(mhi_rates *r) {
+    for (int32_t k = 0; k < r->nodes && r->q != NULL; k++) {
+        forget(r, k);
+    }
+}
+
+void mhi_rates_shift(mhi_rates *r) {
+    if (r->q != NULL) {
+        memmove(r->q, posture(r, 1), sizeof(double) * (size_t)((r->nodes - 1) * r->n_q));
+        forget(r, r->nodes - 1);
+    }
+}
+
+/* Slope from node `a` to node `b` -> v; NaN where one of them has no posture. */
+static void slope(mhi_rates *r, int32_t a, int32_t b, const double *times) {
+    const double span = times[b] - times[a];
+    for (int32_t i = 0; i < r->n_q; i++) {
+        r->v[i] = (posture(r, b)[i] - posture(r, a)[i]) / span;
+    }
+}
+
+static void put(mhi_channel *c, int32_t k, const double *v) {
+    if (!isnan(v[0])) {
+        mhi_channel_set(c, k, v);
+    }
+}
+
+void mhi_rates_take(mhi_rates *r, int32_t k, const double *times, const double *markers,
+                    const double *near, double outlier, mhi_channel *c) {
+    if (r->start == NULL) {
+        return;
+    }
+    const int32_t known = k > 0 && !isnan(posture(r, k - 1)[0]);
+    double distance = NAN;
+    memcpy(r->found, known ? posture(r, k - 1) : near, sizeof(double) * (size_t)r->n_q);
+    const mhe_status status = (isfinite(r->nearest) ? mhi_start_posture : mhi_start_search)(
+        r->start, markers, r->found, &distance, NULL);
+    forget(r, k);
+    /* a frame that no posture comes near, where others fit, was not measured well */
+    if (status != MHE_OK || isnan(distance) || (outlier > 0 && distance > r->nearest + outlier)) {
+        return;
+    }
+    r->nearest = fmin(r->nearest, distance);
+    memcpy(posture(r, k), r->found, sizeof(double) * (size_t)r->n_q);
+    if (k > 0) {
+        slope(r, k - 1, k, times);
+        put(c, k, r->v);
+    }
+    if (k > 1 && !isnan(posture(r, k - 2)[0])) {
+        slope(r, k - 2, k, times);
+        put(c, k - 1, r->v);
+    }
+}

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* rates.h: joint velocities as the markers say: the posture of each node by inverse kinematics, and
+ * its slopes to the nodes beside it.
+ *
+ * Markers are compared at nodes only. What happens between two nodes, while controls are held, they
+ * do not see: a light segment under strong muscles can swing there and be back in time, and where
+ * that saves activation it does. Velocities at the nodes forbid it. */
+#ifndef MHI_RATES_H
+#define MHI_RATES_H
+
+#include "estimator/channel.h"
+#include "estimator/start.h"
+
+typedef struct mhi_rates {
+    mhi_start *start; /* NULL: off */
+    double *q;        /* [nodes x n_q] postures; NaN where none is known */
+    double *found;    /* [n_q] */
+    double *v;        /* [n_q] */
+    double nearest;   /* m, the least distance that was left so far */
+    int32_t n_q, nodes;
+} mhi_rates;
+
+/* Off where data.rates is. [cold] */
+mhe_status mhi_rates_create(mhi_rates *rates, const mhi_run *run, const mhi_system *system,
+                            mhi_system_context *context, const mhi_tasks *tasks, int32_t nodes,
+                            mhi_arena *arena, mhe_error *err);
+void mhi_rates_free(mhi_rates *rates);
+void mhi_rates_clear(mhi_rates *rates);
+void mhi_rates_shift(mhi_rates *rates);
+/* Node k [times: of all nodes] has come with `markers`: its posture, near to that of the node
+ * before or else `near`, and by it the velocities of node k and of the one before, into `channel`.
+ */
+void mhi_rates_take(mhi_rates *rates, int32_t k, const double *times, const double *markers,
+                    const double *near, double outlier, mhi_channel *channel);
+
+#endif
