@@ -9,6 +9,7 @@
 
 struct layers {
     const rig *rig;
+    mhe_system_point at[RIG_POINTS_MAX]; /* the rig's points as the system takes them */
     const mhe_system *system;
     void *system_context;
     const mhe_stage_problem *problem;
@@ -41,32 +42,29 @@ const char *const layer_names[N_LAYERS] = {"skeleton kinematics, all outputs",
 
 typedef struct point {
     const double *x, *u;
-    mhe_system_point at;
+    const mhe_system_point *at;
 } point;
 
 static point next_point(layers *l) {
     const int32_t i = l->next;
     l->next = i + 1 == l->rig->n_points ? 0 : i + 1;
     const mhe_system *s = l->system;
-    point p = {.x = l->rig->x + (ptrdiff_t)i * s->n_x, .u = l->rig->u + (ptrdiff_t)i * s->n_u};
-    mhi_system_point(mhi_estimator_system(l->rig->estimator), p.x, p.u,
-                     mhi_ocp_input(mhi_estimator_ocp(l->rig->estimator), 0), &p.at);
-    return p;
+    return (point){l->rig->x + (ptrdiff_t)i * s->n_x, l->rig->u + (ptrdiff_t)i * s->n_u, &l->at[i]};
 }
 
 static mhe_status call_kinematics(layers *l, mhe_error *err) {
     const point p = next_point(l);
-    return l->model->kinematics(l->model_context, p.at.q, p.at.v, &l->kinematics, err);
+    return l->model->kinematics(l->model_context, p.at->q, p.at->v, &l->kinematics, err);
 }
 
 static mhe_status call_acceleration(layers *l, const mhe_acceleration *out, mhe_error *err) {
     const point p = next_point(l);
-    return l->system->acceleration(l->system, l->system_context, &p.at, out, err);
+    return l->system->acceleration(l->system, l->system_context, p.at, out, err);
 }
 
 static mhe_status call_rate(layers *l, mhe_error *err) {
     const point p = next_point(l);
-    return l->system->activation_rate(l->system, p.at.c, p.at.a, l->rate, l->rate_e, l->rate_a,
+    return l->system->activation_rate(l->system, p.at->c, p.at->a, l->rate, l->rate_e, l->rate_a,
                                       err);
 }
 
@@ -225,6 +223,11 @@ mhe_status layers_create(rig *r, layers **result, mhe_error *err) {
     l->system_context = mhi_ocp_context(mhi_estimator_ocp(r->estimator));
     l->problem = mhi_ocp_face(mhi_estimator_ocp(r->estimator));
     l->model = model->plugin->ops;
+    for (int32_t i = 0; i < r->n_points; i++) {
+        mhi_system_point(system, r->x + (ptrdiff_t)i * l->system->n_x,
+                         r->u + (ptrdiff_t)i * l->system->n_u,
+                         mhi_ocp_input(mhi_estimator_ocp(r->estimator), 0), &l->at[i]);
+    }
     mhe_status status = mhi_model_create(model->plugin, r->host, mhi_system_description(system),
                                          model->config, &l->model_self, err);
     if (status == MHE_OK) {

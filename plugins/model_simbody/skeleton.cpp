@@ -202,8 +202,8 @@ void rows_to_ground(const skeleton &s, const closure &c, const Vector &simbody, 
     if (c.weld) {
         const Rotation b = c.body[0].getBodyTransform(s.state).R() * c.frame[0].R();
         const Rotation f = c.body[1].getBodyTransform(s.state).R() * c.frame[1].R();
-        const Mat33 normal(~(f.x() % b.y()), ~(f.y() % b.z()), ~(f.z() % b.x()));
-        const Vec3 turning = normal.invert() * Vec3(simbody[0], simbody[1], simbody[2]);
+        const Mat33 normals(f.x() % b.y(), f.y() % b.z(), f.z() % b.x()); /* its columns */
+        const Vec3 turning = ~normals.invert() * Vec3(simbody[0], simbody[1], simbody[2]);
         for (int i = 0; i < 3; i++) {
             out[3 + i] = turning[i];
         }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "model/joints.h"
 
-
 #include <string.h>
 
 #define SIX 6

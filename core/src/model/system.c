@@ -9,61 +9,6 @@ static size_t doubles(int32_t n) {
     return sizeof(double) * (size_t)n;
 }
 
-/* ---- paths ---- */
-
-/* Ldot = L_q v of the paths first .. end - 1; with derivatives also dLdot/dq = L_qq v. */
-static void path_velocities(mhi_system_context *c, int32_t from, int32_t to, const double *v,
-                            int32_t derivatives) {
-    const mhi_system *s = c->system;
-    const int32_t n_q = s->face.n_q;
-    for (int32_t m = from; m < to; m++) {
-        const int32_t first = s->first[m], end = s->end[m];
-        const double *l_q = c->length_q + m * n_q;
-        double sum = 0;
-        for (int32_t j = first; j < end; j++) {
-            sum += l_q[j] * v[j];
-        }
-        c->velocity[m] = sum;
-        for (int32_t i = first; i < end && derivatives; i++) {
-            const double *l_qq = c->length_qq + (m * n_q + i) * n_q;
-            double w_q = 0;
-            for (int32_t j = first; j < end; j++) {
-                w_q += l_qq[j] * v[j];
-            }
-            c->velocity_q[m * n_q + i] = w_q;
-        }
-    }
-}
-
-void mhi_path_moment(const mhi_system_context *c, int32_t m, double force, double *moment) {
-    const mhi_system *s = c->system;
-    const double *l_q = c->length_q + m * s->face.n_q;
-    for (int32_t j = s->first[m]; j < s->end[m]; j++) {
-        moment[j] -= l_q[j] * force;
-    }
-}
-
-/* dF/dq = F_l L_q + F_w dLdot/dq,  dF/dv = F_w L_q,
- * d moment/dq = -(L_qq F + L_q^T dF/dq),  d moment/dv = -L_q^T dF/dv. */
-void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t m, double force,
-                                 double force_l, double force_w, double *f_q, double *f_v,
-                                 double *moment_q, double *moment_v) {
-    const mhi_system *s = c->system;
-    const int32_t n_q = s->face.n_q, first = s->first[m], end = s->end[m];
-    const double *l_q = c->length_q + m * n_q, *l_qq = c->length_qq + m * n_q * n_q;
-    const double *w_q = c->velocity_q + m * n_q;
-    for (int32_t i = first; i < end; i++) {
-        f_q[i] = force_l * l_q[i] + force_w * w_q[i];
-        f_v[i] = force_w * l_q[i];
-    }
-    for (int32_t i = first; i < end; i++) {
-        for (int32_t j = first; j < end; j++) {
-            moment_q[i * n_q + j] -= force * l_qq[i * n_q + j] + l_q[i] * f_q[j];
-            moment_v[i * n_q + j] -= l_q[i] * f_v[j];
-        }
-    }
-}
-
 /* ---- muscles ---- */
 
 /* The muscles' states as their plugin wants them: [n_s x n_m]. */
@@ -88,7 +33,7 @@ static mhe_status muscles(mhi_system_context *c, const mhe_system_point *at, int
                           int32_t rates, mhe_error *err) {
     const mhi_system *s = c->system;
     const int32_t n_q = s->face.n_q, n_m = s->face.n_m;
-    path_velocities(c, 0, n_m, at->v, derivatives);
+    mhi_path_velocities(c, 0, n_m, at->v, derivatives);
     const mhe_muscle_point point = {.size = sizeof point,
                                     .excitation = at->c,
                                     .state = muscle_state(c, at->a, at->z),
@@ -118,9 +63,7 @@ static mhe_status muscles(mhi_system_context *c, const mhe_system_point *at, int
         return status;
     }
     memset(c->moment, 0, doubles(n_q));
-    for (int32_t m = 0; m < n_m; m++) {
-        mhi_path_moment(c, m, c->force[m], c->moment);
-    }
+    mhi_path_moments(c, 0, n_m, c->force, c->moment);
     return MHE_OK;
 }
 
@@ -337,7 +280,7 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         status = muscles(c, at, derivatives, rates, err);
     }
     if (status == MHE_OK && c->system->n_forces > 0) {
-        path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
+        mhi_path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
         status = mhi_forces_evaluate(c, at, derivatives, err);
     }
     if (status == MHE_OK && c->system->n_actuators > 0) {
@@ -426,7 +369,7 @@ mhe_status mhi_system_equilibrium(mhi_system_context *c, const double *q, const 
     }
     mhe_status status = kinematics(c, q, v, 0, 0, err);
     if (status == MHE_OK) {
-        path_velocities(c, 0, f->n_m, v, 0);
+        mhi_path_velocities(c, 0, f->n_m, v, 0);
         memcpy(c->state + s->activation * f->n_m, activation, doubles(f->n_m));
     }
     if (status == MHE_OK && s->n_s > 1) {

@@ -107,9 +107,14 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
 mhe_status mhi_system_activation_rate(const mhe_system *face, const double *c, const double *d,
                                       double *rate, double *rate_c, double *rate_d, mhe_error *err);
 
-/* A pull along a path: adds -L_q^T F to `moment`, with `derivatives` what its dF/dL and dF/dLdot
- * make of moment_q and moment_v; force_q, force_v [n_q] are its own derivatives. */
-void mhi_path_moment(const mhi_system_context *c, int32_t path, double force, double *moment);
+/* paths.c: Ldot = L_q v of the paths from .. to - 1; with derivatives also dLdot/dq = L_qq v. */
+void mhi_path_velocities(mhi_system_context *c, int32_t from, int32_t to, const double *v,
+                         int32_t derivatives);
+/* Pulls along the same paths, force [to - from]: adds -L_q^T F to `moment`. */
+void mhi_path_moments(const mhi_system_context *c, int32_t from, int32_t to, const double *force,
+                      double *moment);
+/* What dF/dL and dF/dLdot of one pull make of moment_q and moment_v; force_q, force_v [n_q] are its
+ * own derivatives. */
 void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, double force,
                                  double force_l, double force_w, double *force_q, double *force_v,
                                  double *moment_q, double *moment_v);
