@@ -143,10 +143,13 @@ typedef struct mhe_estimator_info {
     int32_t node; /* of the estimates: 0 the window's oldest frame, `window` the newest */
     double delay; /* s from that node to the newest frame: (window - node) * interval */
     int32_t n_channels;
-    uint32_t channel_size;       /* stride of `channels` */
-    const mhe_channel *channels; /* delay and gap follow the interval */
-    int32_t phase;               /* MHE_PHASE_*, at the moment */
-    const mhe_layout *layout;    /* of states, controls, inputs, parameters */
+    uint32_t channel_size;          /* stride of `channels` */
+    const mhe_channel *channels;    /* delay and gap follow the interval */
+    int32_t phase;                  /* MHE_PHASE_*, at the moment */
+    const mhe_layout *layout;       /* of states, controls, inputs, parameters */
+    int32_t n_joints;               /* that reactions are given of; 0: output.reactions is none */
+    const char *const *joint_names; /* [n_joints] "hip_r_on_femur_r_in_femur_r": the joint, the
+                                     * body it carries, whose axes */
 } mhe_estimator_info;
 
 /* Row i of the table. [any] */
@@ -205,6 +208,10 @@ typedef struct mhe_estimate {
     const mhe_layout *layout;   /* names and places of what follows: every block of the system */
     const double *states;       /* [layout->n_x] */
     const double *controls;     /* [layout->n_u]; at the last node those that lead to it */
+    const double *inputs;       /* [layout->n_w] of forces, at this time; NULL: there are none */
+    const double *reactions;    /* [n_joints x 6] force, N, and moment, N m, on the child at the
+                                 * joint's centre; NULL: output.reactions is none, or NaN: none
+                                 * could be found */
 } mhe_estimate;
 
 /* Values of a block of an estimate [block->count]; NULL: it is no state or control. [any] */

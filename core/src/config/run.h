@@ -126,7 +126,8 @@ typedef struct mhi_realtime_section {
 typedef struct mhi_output_section {
     const char *node_name; /* as written; "auto" is left to the program */
     int32_t node;          /* what it means: 0 .. window; "auto": 0 */
-    int32_t picture; /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t picture;   /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t reactions; /* MHI_IN_* of model/joints.h */
     mhe_text_list formats;         /* of "sto", "csv", "mat"; .sto is written in any case */
     int32_t skip_first, skip_last; /* estimates left out of the errors in summary.json */
 } mhi_output_section;

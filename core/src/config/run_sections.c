@@ -86,10 +86,10 @@ static const mhe_option data_options[] = {
 };
 
 static const mhe_option transform_options[] = {
-    MHE_OPT_TEXTS(
-        mhi_transform_section, rotate, 0,
-        "Turn about an axis by degrees: x-90, or [AXIS, DEGREES], where the axis is x, y, z "
-        "or [a, b, c]."),
+    MHE_OPT_TEXTS(mhi_transform_section, rotate, 0,
+                  "Turn about an axis by degrees (of markers, and of external loads in ground): "
+                  "x-90, or [AXIS, DEGREES], where the axis is x, y, z "
+                  "or [a, b, c]."),
     MHE_OPT_REALS(mhi_transform_section, shift, 0, -DBL_MAX, DBL_MAX, "m",
                   "Added afterwards, in the model's frame."),
     MHE_OPT_REAL(mhi_transform_section, scale, 1, -1e6, 1e6, "1",
@@ -207,6 +207,9 @@ static const mhe_option output_options[] = {
                  "Draw estimated against reference, where gnuplot is installed."),
     MHE_OPT_TEXTS(mhi_output_section, formats, 0,
                   "Formats of the results beside .sto: csv, mat (MATLAB, all in results.mat)."),
+    MHE_OPT_ENUM(mhi_output_section, reactions, "none", "none|child|parent|ground",
+                 "What joints transmit, force and moment on the child at the joint's centre, in "
+                 "the axes of the child, of the parent or of ground (reactions.sto)."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
                 "Estimates at the start that the errors in summary.json leave out."),
     MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",

@@ -21,6 +21,7 @@
 #include "estimator/tasks.h"
 #include "estimator/trust.h"
 #include "estimator/window.h"
+#include "model/joints.h"
 
 #include <math.h>
 #include <mhe/config.h>
@@ -36,7 +37,9 @@ struct mhe_estimator {
     mhe_description *owned_description; /* NULL where it was lent */
     const mhe_description *description;
     mhi_system *system;
-    const mhi_tasks *tasks; /* data.marker_weights; NULL: none */
+    mhi_reactions *reactions; /* NULL: not wanted */
+    const char **joint_names; /* [n_bodies] */
+    const mhi_tasks *tasks;   /* data.marker_weights; NULL: none */
     mhi_ocp *ocp;
     const mhe_solver_ops *solver;
     void *solver_self;

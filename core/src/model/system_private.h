@@ -72,6 +72,7 @@ struct mhi_system_context {
     double *push, *push_d, *push_w;         /* [most_pairs x 6], [most_pairs x 6 x 6] */
     double *pair_rows, *pair_loads;         /* [most_pairs x 6 x n_q], [n_q x 36] */
     double *pair_q, *pair_work, *pair_turn; /* [n_q x n_q], [18 x n_q], [3 x n_q] */
+    double *solved;                         /* [n_q x 3 n_q] vdot by q, by v, by torques */
     double *row_q, *row_v;                  /* [n_q] */
     double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
     double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */
@@ -143,6 +144,12 @@ void mhi_loops_closed(const mhi_system_context *c, int32_t by, double *columns, 
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
  * in other_q, other_v. Needs the kinematics of `at` in the context. */
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+/* Tensions of the force plugins' paths, added to `tension` [n_paths], and each plugin's loads.
+ * Needs the kinematics of `at` in the context. */
+typedef mhe_status mhi_force_loads(void *data, const mhe_load *loads, int32_t n,
+                                   const double *values, mhe_error *err);
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
+                           mhi_force_loads *loads, void *data, mhe_error *err);
 /* Each is finite at the model's default posture; once the system is whole. */
 mhe_status mhi_forces_check(mhi_system *s, mhe_error *err);
 void mhi_forces_destroy(mhi_system *s);
