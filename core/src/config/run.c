@@ -422,6 +422,14 @@ static mhe_status check_run(const struct reader *r) {
     if (run->data.emg_delay < 0) {
         run->data.emg_delay = by_activation && run->emg.n_channels == 0 ? 2 : 0;
     }
+    for (int32_t i = 0; i < run->n_costs && run->emg.sample == MHI_EMG_SAMPLE_BY_COST; i++) {
+        if (run->costs[i].plugin->flags & MHE_FLAG_MEAN_TARGETS) {
+            run->emg.sample = MHI_EMG_SAMPLE_MEAN;
+        }
+    }
+    if (run->emg.sample == MHI_EMG_SAMPLE_BY_COST) {
+        run->emg.sample = MHI_EMG_SAMPLE_NODE;
+    }
     if (run->emg.delay < 0) {
         run->emg.delay = by_activation ? 0.02 : 0;
     }
