@@ -26,12 +26,12 @@ excitations() {
         print "" }' > "$file"
 }
 
-# config FILE MODEL DATA_DIR MORE_OF_MODEL
+# config FILE MODEL DATA_DIR MORE_OF_MODEL RATIO
 config() {
     cat > "$1" <<YAML
 model: {file: "$2"$4, unsupported: stop}
 data: {markers: $3/markers.trc, emg: $3/emg.sto, reference: $3/reference.sto}
-horizon: {window: 7, ratio: 3}
+horizon: {window: 7, ratio: $5}
 integrator: {plugin: mhe.integrator.rk}
 costs: [{plugin: mhe.cost.emg-markers-high}]
 solver: {plugin: mhe.solver.ipopt, tolerance: 1e-4, max_iterations: 30}
@@ -56,7 +56,7 @@ gap() {
 
 excitations e.sto 1.0 0.25 0.2 pull_left pull_right lift across
 for dynamics in recursive simbody; do
-    config "$dynamics.yaml" "$source/tests/apps/linkage.osim" sim "" # dynamics are the simulation's
+    config "$dynamics.yaml" "$source/tests/apps/linkage.osim" sim "" 3 # dynamics are the simulation's
     "$bin/mhe-sim" forward "$dynamics.yaml" --input e.sto --rate 100 --out sim --set "model.dynamics=$dynamics" \
         > sim.txt 2>&1 || fail "mhe-sim, $dynamics: $(cat sim.txt)"
     sed 's/q_//g' sim/reference.sto > reference.sto
@@ -70,12 +70,12 @@ if [ -r "$shoulder" ]; then
     muscles=$("$bin/mhe-model" info "$shoulder" | awk '/^muscles:/ { on = 1; next } /^$/ { on = 0 } on { print $1 }')
     # shellcheck disable=SC2086 # names without blanks
     excitations e.sto 1.0 0.1 0.08 $muscles
-    config shoulder.yaml "$shoulder" shoulder-sim ""
+    config shoulder.yaml "$shoulder" shoulder-sim "" 2
     "$bin/mhe-sim" forward shoulder.yaml --input e.sto --rate 100 --out shoulder-sim > sim.txt 2>&1 || fail "$(cat sim.txt)"
     estimate shoulder 0.05 3
     XDG_CACHE_HOME=$work/cache
     export XDG_CACHE_HOME
-    config fitted.yaml "$shoulder" shoulder-sim ", paths: fitted"
+    config fitted.yaml "$shoulder" shoulder-sim ", paths: fitted" 2
     estimate fitted 0.05 3
 fi
 finish loops
