@@ -8,6 +8,8 @@
 
 #include <Simbody.h>
 
+#include <algorithm>
+#include <cmath>
 #include <exception>
 #include <new>
 #include <vector>
@@ -28,10 +30,13 @@ struct skeleton {
     SimbodyMatterSubsystem matter;
     std::vector<MobilizedBody> links;
     std::vector<closure> loops;
+    std::vector<double> excess; /* of the links' inertias, see inertia_excess() */
+    bool any_excess = false;
     std::vector<int> q, u; /* Simbody's numbers of the joints */
     State state;
     Vector none, acceleration, torque, loop_error;
     Vector_<SpatialVec> weight; /* gravity on each body, filled at the pose */
+    Vector_<SpatialVec> motion; /* accelerations of the bodies */
     Matrix mass;
 
     explicit skeleton(const tree *from) : source(from), matter(system) {}
@@ -61,12 +66,28 @@ Vec3 vector(const double *p) {
     return Vec3(p[0], p[1], p[2]);
 }
 
-MassProperties mass_properties(const tree_joint &link, bool with_mass) {
+/* Simbody refuses inertias that no rigid body can have (triangle inequality), which files do hold.
+ * Such a link gets this much more about every axis, and what that does is taken off again: about
+ * every axis alike, it takes the torque excess times the angular acceleration, and nothing else. */
+double inertia_excess(const tree_joint &link) {
+    const double *i = link.inertia, sum = i[0] + i[4] + i[8];
+    const double least = 2 * std::max(i[0], std::max(i[4], i[8])) - sum; /* > 0: it is broken */
+    double products = 0;
+    for (int k = 0; k < 9; k++) {
+        products = std::max(products, k % 4 == 0 ? 0.0 : std::fabs(i[k]));
+    }
+    const double smallest = std::min(i[0], std::min(i[4], i[8]));
+    return link.mass > 0 && (least > 0 || smallest < 2 * products || smallest <= 0)
+               ? std::max(least, 0.0) + 2 * products + std::max(-smallest, 0.0) + 1e-3 * sum + 1e-9
+               : 0;
+}
+
+MassProperties mass_properties(const tree_joint &link, bool with_mass, double excess) {
     if (!with_mass || link.mass <= 0) {
         return MassProperties(0, Vec3(0), Inertia(0));
     }
     const double *i = link.inertia;
-    Inertia central(i[0], i[4], i[8], i[1], i[2], i[5]);
+    Inertia central(i[0] + excess, i[4] + excess, i[8] + excess, i[1], i[2], i[5]);
     Vec3 com = vector(link.com);
     return MassProperties(link.mass, com, central.shiftFromMassCenter(-com, link.mass));
 }
@@ -77,7 +98,9 @@ void add_link(skeleton &s, const tree_joint &joint, bool with_mass) {
     /* the file's matrix as it is: Simbody would project a rounded one, and points of the same body
      * would then be placed by another matrix */
     Transform at(Rotation(matrix(joint.r), true), vector(joint.p));
-    Body::Rigid body(mass_properties(joint, with_mass));
+    s.excess.push_back(with_mass ? inertia_excess(joint) : 0);
+    s.any_excess = s.any_excess || s.excess.back() > 0;
+    Body::Rigid body(mass_properties(joint, with_mass, s.excess.back()));
     if (joint.kind == MHE_MOTION_ROTATION) {
         s.links.push_back(MobilizedBody::Pin(parent, at, body, Transform()));
     } else {
@@ -151,6 +174,40 @@ void place(skeleton &s, const double *angle, double *r, double *p) {
     }
 }
 
+/* Joint i's axis in ground; 0 of a slider. */
+Vec3 turning_axis(const skeleton &s, size_t i) {
+    return s.source->joints[i].kind == MHE_MOTION_ROTATION
+               ? Vec3(s.links[i].getBodyTransform(s.state).R().z())
+               : Vec3(0);
+}
+
+/* Takes off the torques that the excess of inertia takes, at the state and accelerations. */
+void take_off_torque(skeleton &s, double *torque) {
+    s.matter.calcBodyAccelerationFromUDot(s.state, s.acceleration, s.motion);
+    for (size_t l = 0; l < s.links.size(); l++) {
+        const Vec3 moment =
+            s.excess[l] * s.motion[static_cast<int>(s.links[l].getMobilizedBodyIndex())][0];
+        for (int32_t i = static_cast<int32_t>(l); i >= 0 && s.excess[l] > 0;
+             i = s.source->joints[i].parent) {
+            torque[i] -= dot(turning_axis(s, static_cast<size_t>(i)), moment);
+        }
+    }
+}
+
+void take_off_mass(const skeleton &s, double *mass) {
+    const size_t n = s.links.size();
+    for (size_t l = 0; l < n; l++) {
+        for (int32_t i = static_cast<int32_t>(l); i >= 0 && s.excess[l] > 0;
+             i = s.source->joints[i].parent) {
+            for (int32_t j = static_cast<int32_t>(l); j >= 0; j = s.source->joints[j].parent) {
+                mass[n * static_cast<size_t>(i) + static_cast<size_t>(j)] -=
+                    s.excess[l] * dot(turning_axis(s, static_cast<size_t>(i)),
+                                      turning_axis(s, static_cast<size_t>(j)));
+            }
+        }
+    }
+}
+
 void inverse(skeleton &s, const double *speed, const double *acceleration, double *torque) {
     Vector &u = s.state.updU();
     Vec3 gravity = vector(s.source->gravity);
@@ -169,6 +226,9 @@ void inverse(skeleton &s, const double *speed, const double *acceleration, doubl
     for (size_t i = 0; i < s.links.size(); i++) {
         torque[i] = s.torque[s.u[i]];
     }
+    if (s.any_excess) {
+        take_off_torque(s, torque);
+    }
 }
 
 void mass_matrix(skeleton &s, double *mass) {
@@ -178,6 +238,9 @@ void mass_matrix(skeleton &s, double *mass) {
         for (size_t j = 0; j < n; j++) {
             mass[n * i + j] = s.mass(s.u[i], s.u[j]);
         }
+    }
+    if (s.any_excess) {
+        take_off_mass(s, mass);
     }
 }
 

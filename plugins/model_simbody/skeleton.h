@@ -13,8 +13,7 @@ extern "C" {
 typedef struct skeleton skeleton;
 
 /* `tree` must outlive the skeleton. `description`, which the tree is of: with mass and loops; NULL:
- * for poses alone. Simbody refuses inertias that no rigid body can have (triangle inequality),
- * which files do hold. [cold] */
+ * for poses alone. [cold] */
 mhe_status skeleton_create(const tree *tree, const mhe_description *description, skeleton **out,
                            mhe_error *err);
 void skeleton_free(skeleton *skeleton); /* [cold] */

@@ -155,6 +155,11 @@ static void mistakes_are_named_with_their_line(void **state) {
          "m:14: coupler 'd' closes a circle: 'p' depends on 'q', which depends on it"},
         {DOCUMENT(TWO SET("ConstraintSet", COUPLER("c", "p", "q") COUPLER("d", "p", "q"))),
          "m:14: coordinate 'q' has a coupler already ('c', line 13)"},
+        {DOCUMENT(
+             ARM SET("ConstraintSet",
+                     "<PointConstraint name=\"pin\"><socket_body_1>/bodyset/arm</socket_body_1>"
+                     "<socket_body_2>/bodyset/arm</socket_body_2></PointConstraint>")),
+         "m:13: PointConstraint 'pin' holds 'arm' to itself"},
         {DOCUMENT(TWO SET("ConstraintSet", COUPLER("c", "p", "knee"))),
          "m:13: coupler 'c' names an unknown coordinate 'knee' (valid: p, q)"},
     };

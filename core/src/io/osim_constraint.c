@@ -65,6 +65,13 @@ static void read_loop(mhi_osim *o, xmlNode *node, int32_t kind) {
                              frame)) {
         return;
     }
+    if (body[0] == body[1] ||
+        (body[0] != NULL && body[1] != NULL && strcmp(body[0], body[1]) == 0)) {
+        mhi_build_fail(&o->b, mhi_xml_line(node), "%s '%s' holds '%s' to itself",
+                       (const char *)node->name, mhi_xml_name(o, node),
+                       body[0] != NULL ? body[0] : "ground");
+        return;
+    }
     mhi_loop_draft *draft = mhi_build_push(&o->b, &o->b.loops, sizeof *draft);
     if (draft == NULL) {
         return;

@@ -16,6 +16,8 @@
 #include "model/system_private.h"
 
 #include <math.h>
+#include <mhe/host.h>
+#include <stdio.h>
 #include <string.h>
 
 #define CLOSING_RATE 20.0 /* 1/s, k */
@@ -240,5 +242,27 @@ mhe_status mhi_system_close_loops(mhi_system_context *c, double *q, double *v, m
     if (status == MHE_OK && v != NULL && step_back(c, c->gap_rate_v, c->gap_rate, v) != 0) {
         return mhe_fail(err, MHE_RETRY, "the speeds of a loop are not finite");
     }
+    return status;
+}
+
+mhe_status mhi_loops_tell(mhi_system *s, const mhe_host *host, mhe_error *err) {
+    const mhe_description *d = s->description;
+    mhi_system_context *c = NULL;
+    mhe_error why = {0};
+    mhi_arena arena = {0};
+    double *q = MHI_TAKE(&arena, double, d->n_coordinates);
+    mhe_status status = q == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                  : mhi_system_context_create(s, &c, err);
+    for (int32_t i = 0; i < d->n_coordinates && status == MHE_OK; i++) {
+        q[i] = d->coordinates[i].value;
+    }
+    if (status == MHE_OK && mhi_system_close_loops(c, q, NULL, &why) != MHE_OK) {
+        char text[512];
+        (void)snprintf(text, sizeof text, "%s:%d: at the default posture: %.300s", d->source,
+                       (int)d->loops[0].line, why.text);
+        host->log(host, MHE_LOG_WARNING, text);
+    }
+    mhi_system_context_free(c);
+    mhi_arena_free(&arena);
     return status;
 }

@@ -169,6 +169,9 @@ mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system,
     if (status == MHE_OK) {
         status = mhi_forces_check(s, err);
     }
+    if (status == MHE_OK && s->n_c > 0) {
+        status = mhi_loops_tell(s, setup->host, err);
+    }
     if (status != MHE_OK) {
         mhi_system_free(s);
         return status;

@@ -138,6 +138,8 @@ mhe_status mhi_pairs_push(mhi_system_context *c, const mhe_frame_pair *pair, con
  * those of the closed ones, `by` saying what they are by. */
 enum { MHI_LOOPS_BY_Q, MHI_LOOPS_BY_V, MHI_LOOPS_BY_OTHER };
 mhe_status mhi_loops_prepare(mhi_system *s, mhe_error *err);
+/* Warns of loops that cannot be closed from the default posture; once the system is whole. */
+mhe_status mhi_loops_tell(mhi_system *s, const mhe_host *host, mhe_error *err);
 mhe_status mhi_loops_close(mhi_system_context *c, int32_t derivatives, double *vdot,
                            mhe_error *err);
 /* With the loops' own derivatives at vdot; takes what the closing force does off tau_q, that of the
