@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The documentation as a site with a search: gathers the pages that lie in the tree, and lets mkdocs build them.
+
+    make.py SOURCE_DIR WORK_DIR PROGRAMS      the site is WORK_DIR/html
+
+Pages stay readable where they lie; here their links are moved to where the pages go. The reference is made from the programs'
+own help, the plugins' READMEs and the public headers, which are the manual.
+"""
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+PROGRAMS = ["mhe-run", "mhe-live", "mhe-model", "mhe-calibrate", "mhe-sim", "mhe-study", "mhe-bench"]
+TUTORIALS = ["raw-emg", "walking", "calibration", "calibrate", "live", "realtime", "batch", "simulate", "studies", "python", "matlab",
+             "plugins"]
+EXPLANATIONS = ["outputs", "believability", "faq", "opensim", "paths", "elastic-tendon", "uncertainty", "study", "performance",
+                "comparison", "architecture", "abi", "style", "glossary"]
+
+
+class Site:
+    def __init__(self, source, work, programs):
+        self.source, self.work, self.programs = Path(source).resolve(), Path(work).resolve(), Path(programs)
+        self.pages = {}  # file in the tree -> page of the site
+        self.broken = []
+
+    def plan(self):
+        self.pages[self.source / "README.md"] = "index.md"
+        for page in sorted((self.source / "docs").glob("*.md")):
+            self.pages[page] = page.name
+        for readme in sorted((self.source / "plugins").glob("*/README.md")):
+            self.pages[readme] = f"plugins/{readme.parent.name}.md"
+        for readme in sorted((self.source / "models").glob("*/README.md")):
+            self.pages[readme] = f"models/{readme.parent.name}.md"
+        for name in ("CONTRIBUTING.md", "CHANGELOG.md"):
+            self.pages[self.source / name] = name.lower()
+
+    def write(self, page, text):
+        path = self.work / "pages" / page
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+    def moved_link(self, origin, page, target):
+        """Where a link of `origin` leads once it is `page`; None: it stays text (a file that is no page)."""
+        name, _, anchor = target.partition("#")
+        if not name or re.match(r"[a-z]+:", target):
+            return target
+        file = (origin.parent / name).resolve()
+        if file in self.pages:
+            to = os.path.relpath(self.pages[file], os.path.dirname(page) or ".")
+            return to + (f"#{anchor}" if anchor else "")
+        if not file.exists():
+            self.broken.append(f"{origin.relative_to(self.source)}: there is no {target}")
+            return None
+        if file.suffix in (".svg", ".png"):
+            copy = self.work / "pages/pictures" / str(file.relative_to(self.source)).replace("/", "_")
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(file.read_bytes())
+            return os.path.relpath(copy, (self.work / "pages" / page).parent)
+        return None
+
+    def page(self, origin, page):
+        def link(found):
+            to = self.moved_link(origin, page, found[3])
+            return f"{found[1]}[{found[2]}]({to})" if to is not None else found[2]
+        parts = re.split(r"(```.*?```)", origin.read_text(), flags=re.S)
+        for i in range(0, len(parts), 2):
+            parts[i] = re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, parts[i])
+        return "".join(parts)
+
+    def header(self, path):
+        text = path.read_text()
+        about = re.search(r"/\* ([\w]+\.h: .*?)\*/", text, re.S)
+        body = text[about.end():] if about else text
+        prose = re.sub(r"^ \* ?", "", about[1] if about else "", flags=re.M).strip()
+        return f"# mhe/{path.name}\n\n```text\n{prose}\n```\n\n```c\n{body.strip()}\n```\n"
+
+    def gather(self):
+        self.plan()
+        for origin, page in self.pages.items():
+            self.write(page, self.page(origin, page))
+        for header in sorted((self.source / "core/include/mhe").glob("*.h")):
+            self.write(f"headers/{header.name.replace('.', '_')}.md", self.header(header))
+        self.used = []
+        for program in PROGRAMS:
+            path = self.programs / program
+            if path.exists():
+                self.used.append(program)
+                said = subprocess.run([path, "--help"], capture_output=True, text=True, check=True).stdout
+                self.write(f"programs/{program}.md", f"# {program}\n\n```text\n{said}```\n")
+
+    def listed(self, names):
+        """Nav entries of the pages that are there."""
+        return [page for page in (f"{name}.md" for name in names) if (self.work / "pages" / page).exists()]
+
+    def below(self, folder):
+        return sorted(f"{folder}/{page.name}" for page in (self.work / "pages" / folder).glob("*.md"))
+
+    def nav(self):
+        known = self.listed(TUTORIALS) + self.listed(EXPLANATIONS) + ["index.md", "config.md", "contributing.md", "changelog.md"]
+        rest = sorted(p.name for p in (self.work / "pages").glob("*.md") if p.name not in known)
+        return [("Start", ["index.md"]), ("How to", self.listed(TUTORIALS)), ("Understand", self.listed(EXPLANATIONS) + rest),
+                ("Reference", ["config.md"] + [f"programs/{p}.md" for p in self.used]),
+                ("Plugins", self.below("plugins")), ("Models", self.below("models")), ("Headers", self.below("headers")),
+                ("Project", ["contributing.md", "changelog.md"])]
+
+    def build(self):
+        nav = "".join(f"  - {title}:\n" + "".join(f"    - {page}\n" for page in pages) for title, pages in self.nav() if pages)
+        (self.work / "mkdocs.yml").write_text(
+            f"site_name: Myohorizon\nsite_url: ''\nuse_directory_urls: false\ndocs_dir: pages\nsite_dir: html\n"
+            f"theme: {{name: readthedocs, locale: en, highlightjs: false, navigation_depth: 2}}\n"
+            f"extra_css: [site.css]\nmarkdown_extensions: [tables, fenced_code, toc]\nplugins: [search]\nnav:\n{nav}")
+        (self.work / "pages/site.css").write_text((self.source / "docs/site/site.css").read_text())
+        done = subprocess.run(["/usr/bin/python3", "-m", "mkdocs", "build", "--strict", "--clean", "-q", "-f",
+                               str(self.work / "mkdocs.yml")], capture_output=True, text=True)
+        if done.returncode != 0 or self.broken:
+            sys.exit("\n".join(self.broken) + done.stdout + done.stderr)
+
+
+def main(source, work, programs):
+    site = Site(source, work, programs)
+    subprocess.run(["rm", "-rf", str(site.work / "pages"), str(site.work / "html")], check=True)
+    site.gather()
+    site.build()
+    print(f"{site.work}/html/index.html")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
