@@ -105,6 +105,8 @@ typedef struct mhe_stage {
     const double *y_ref; /* [ny], NaN where no target is known; of MHE_AT_PREVIOUS: the target that
                           * the node before had */
     void *scratch;       /* [scratch_bytes], 64-byte aligned, this thread's own */
+    const double *y_spread; /* [ny] standard deviation of an entry's targets since the start, of
+                             * EMG; NaN: not known. May be NULL */
 } mhe_stage;
 
 /* Is an entry the one of that name, or one of its axes ("STER.x" of "STER")? [any] */

@@ -66,6 +66,7 @@ typedef struct mhe_estimator mhe_estimator;
 #define MHE_GAP_HOLD 0    /* the newest sample at or before the node */
 #define MHE_GAP_LINEAR 1  /* linear between the samples beside it */
 #define MHE_GAP_NEAREST 2 /* the sample nearest to it */
+#define MHE_GAP_MEAN 3    /* mean of the samples from the node on, before the next; else HOLD */
 
 /* One row of the table. Strings and arrays live as long as the estimator. */
 typedef struct mhe_channel {
@@ -78,7 +79,7 @@ typedef struct mhe_channel {
     const char *const *labels;  /* [n_labels] of markers, muscles, coordinates */
     const char *const *columns; /* [width], "WRIST.x" where there are several a label */
     const char *const *units;   /* [width] */
-    int32_t gap_rule;           /* MHE_GAP_* */
+    int32_t gap_rule;           /* MHE_GAP_*; MEAN: frames between two nodes count, too */
     double gap;                 /* s; 0 before the interval is known */
     double delay;               /* s by which a node's value is older than the node: data.emg_delay
                                  * frames; 0 before the interval is known */

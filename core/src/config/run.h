@@ -64,6 +64,11 @@ typedef struct mhi_transform_section {
     double turn[9]; /* what `rotate` means, row-major */
 } mhi_transform_section;
 
+/* What a node's controls are compared with. */
+#define MHI_EMG_SAMPLE_BY_COST 0
+#define MHI_EMG_SAMPLE_NODE 1
+#define MHI_EMG_SAMPLE_MEAN 2
+
 #define MHI_EMG_LOW_PASS 0
 #define MHI_EMG_AVERAGE 1
 #define MHI_EMG_RMS 2
@@ -82,6 +87,7 @@ typedef struct mhi_emg_channel {
 /* From electrodes to muscles; without channels the columns of data.emg are muscles, and this
  * section does nothing. */
 typedef struct mhi_emg_section {
+    int32_t sample;  /* MHI_EMG_SAMPLE_*; by the costs, resolved when read */
     int32_t process; /* 0: the columns are envelopes */
     int32_t band_order;
     double band_low, band_high; /* Hz */

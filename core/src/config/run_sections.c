@@ -97,6 +97,9 @@ static const mhe_option transform_options[] = {
 };
 
 static const mhe_option emg_options[] = {
+    MHE_OPT_ENUM(mhi_emg_section, sample, "cost", "cost|node|mean",
+                 "EMG that a node's controls are compared with: at the node, or the mean until the "
+                 "next node; cost: as the costs want it."),
     MHE_OPT_BOOL(mhi_emg_section, process, 1,
                  "Band-pass, rectify and smooth; false: the columns are envelopes."),
     MHE_OPT_INT(mhi_emg_section, band_order, 2, 0, 8, "1",
@@ -251,8 +254,8 @@ static const mhi_section sections[] = {
         "From the frame of the recording's markers to the model's: first turned and scaled, then "
         "shifted.",
         NULL, transform_options, AT(transform)),
-    SECTION("emg", "From electrodes to muscles; to be given with channels.", NULL, emg_options,
-            AT(emg)),
+    SECTION("emg", "From electrodes to muscles; to be given with channels, but for sample.", NULL,
+            emg_options, AT(emg)),
     SECTION("emg.channels", "A list: the electrodes. Muscles that none of them names have no EMG.",
             NULL, channel_options, 0),
     SECTION("initial", "Start of the motion.", NULL, initial_options, AT(initial)),

@@ -78,6 +78,9 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
 /* locked.c: takes what the model section locks out of a description just read. */
 mhe_status mhi_estimator_lock(const mhi_run *run, mhe_description *description, mhe_error *err);
 
+/* feed.c: means of the intervals that are not complete yet, as far as their samples go. */
+mhe_status mhi_feed_before_solve(mhe_estimator *e, mhe_error *err);
+
 /* Distance of two sets of n numbers, of which per_point make a point; NaN entries do not count. */
 double mhi_rms_distance(const double *a, const double *b, int32_t n, int32_t per_point);
 

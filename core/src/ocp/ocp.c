@@ -134,7 +134,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     const double *before = k == 0 ? NULL : targets - ocp->signals.n_y;
     for (int32_t i = 0; i < ocp->n_terms && status == MHE_OK; i++) {
         status = mhi_term_add(&ocp->terms[i], &w->terms[i], &ocp->signals, &stage, w->y, targets,
-                              before, w->jacobian, scale, n_z, &sum, err);
+                              before, ocp->spread, w->jacobian, scale, n_z, &sum, err);
     }
     if (status != MHE_OK) {
         return status;
@@ -255,6 +255,11 @@ double *mhi_ocp_u_upper(mhi_ocp *ocp, int32_t k) {
 double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k) {
     const mhi_signal *s = &ocp->signals.signal[signal];
     return s->n_y == 0 ? NULL : ocp->targets + (ptrdiff_t)k * ocp->signals.n_y + s->offset;
+}
+
+double *mhi_ocp_target_spread(mhi_ocp *ocp, int32_t signal) {
+    const mhi_signal *s = &ocp->signals.signal[signal];
+    return s->n_y == 0 ? NULL : ocp->spread + s->offset;
 }
 
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {

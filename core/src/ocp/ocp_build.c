@@ -233,6 +233,7 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->u_lower = filled(&ocp->arena, n * ocp->face.n_u, -INFINITY);
     ocp->u_upper = filled(&ocp->arena, n * ocp->face.n_u, INFINITY);
     ocp->targets = filled(&ocp->arena, (n + 1) * ocp->signals.n_y, NAN);
+    ocp->spread = filled(&ocp->arena, ocp->signals.n_y, NAN);
     ocp->times = filled(&ocp->arena, n + 1, 0);
     ocp->inputs = filled(&ocp->arena, (n + 1) * ocp->n_w, NAN);
     ocp->prior_centre = filled(&ocp->arena, ocp->face.n_x, 0);
@@ -246,7 +247,8 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->face.u_upper = ocp->u_upper;
     ocp->workers = MHI_TAKE(&ocp->arena, mhi_ocp_worker, ocp->face.n_workers);
     if (!ocp->x_lower || !ocp->x_upper || !ocp->u_lower || !ocp->u_upper || !ocp->targets ||
-        !ocp->times || !ocp->inputs || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers) {
+        !ocp->spread || !ocp->times || !ocp->inputs || !ocp->prior_centre || !ocp->prior_weight ||
+        !ocp->workers) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;

@@ -36,6 +36,7 @@ struct mhi_ocp {
     mhi_work work;
     double *x_lower, *x_upper, *u_lower, *u_upper;
     double *targets; /* [(N+1) x n_y] */
+    double *spread;  /* [n_y] of the targets */
     double *times;   /* [N+1] */
     double *inputs;  /* [(N+1) x n_w] */
     int32_t n_w;
