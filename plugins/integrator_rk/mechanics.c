@@ -27,7 +27,7 @@
 /* Error left in the stages before, and largest size of, the last full correction: what it leaves is
  * of the order of its square, and the derivatives belong to stages that are off by no more. */
 #define RK_BEFORE_LAST 1e-6
-#define RK_LAST 1e-4
+#define RK_LAST 1e-5
 #define RK_LAST_ROUNDS 3
 
 /* Stage position and velocity from the stage accelerations. */
