@@ -22,6 +22,8 @@ mhe_status tally_add(tally *t, const mhe_estimate *estimate, mhe_error *err) {
     t->n_deadline += estimate->status == MHE_FRAME_DEADLINE;
     t->n_predicted += estimate->status == MHE_FRAME_PREDICTED;
     t->iterations_sum += estimate->iterations;
+    t->programs += estimate->programs;
+    t->fallbacks += estimate->fallbacks;
     if (estimate->iterations > t->iterations_max) {
         t->iterations_max = estimate->iterations;
     }

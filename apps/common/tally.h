@@ -10,6 +10,7 @@ typedef struct tally {
     int32_t n_solves, n_converged, n_deadline;
     int32_t n_predicted; /* the solve failed */
     double iterations_sum;
+    int64_t programs, fallbacks; /* of the solver, mhe_estimate */
     int32_t iterations_max;
     double *solve_ms; /* [n_solves] */
     int32_t capacity;

@@ -33,8 +33,16 @@ static const words_option options[] = {
      .at = AT(repeats),
      .low = 1,
      .high = REPEATS_MAX},
+    {.name = "--scale",
+     .help = "no CONFIG: how a frame's time grows with coordinates (7 to 37) and muscles (20 to "
+             "150), on models that are made up in DIR, ./out/scale unless given",
+     .kind = WORDS_FLAG,
+     .at = AT(scale),
+     .low = 1,
+     .mode = 1},
     {.name = "--quick",
-     .help = "two runs of at most 25 estimates, and without --vary three windows",
+     .help = "two runs of at most 25 estimates, and without --vary three windows; with --scale "
+             "the three smallest models",
      .kind = WORDS_FLAG,
      .at = AT(quick),
      .low = 1}};
@@ -46,6 +54,7 @@ const words_program arguments_program = {
     .usage =
         "  mhe-bench CONFIG.yaml [--set path.to.key=value]... [--vary path.to.key=v1,v2,v3]...\n"
         "            [--repeats N] [--quick] [--out DIR]\n"
+        "  mhe-bench --scale [--set path.to.key=value]... [--repeats N] [--quick] [--out DIR]\n"
         "  mhe-bench --version | --help\n",
     .notes = "Layers are timed once for all windows. Exit status: 0 done; 1 a run failed; 2 the\n"
              "command line, the configuration or an input file is wrong.\n",
@@ -55,4 +64,5 @@ const words_program arguments_program = {
     .n_options = sizeof options / sizeof options[0],
     .mode = AT(mode),
     .operand = AT(config),
-    .others = AT(others)};
+    .others = AT(others),
+    .modes_without = 1u << 1};

@@ -6,7 +6,8 @@
 #include "words.h"
 
 typedef struct arguments {
-    int32_t mode; /* 0 */
+    int32_t mode; /* 1: --scale */
+    int32_t scale;
     int32_t quick;
     int32_t repeats; /* 0: not given */
     const char *config;

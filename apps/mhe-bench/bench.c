@@ -224,7 +224,7 @@ mhe_status bench_measure(const bench_setup *setup, bench *b, mhe_error *err) {
     b->silent = *setup->host;
     b->silent.log = drop_line;
     mhe_status status = prepare_runs(b, err);
-    if (status == MHE_OK) {
+    if (status == MHE_OK && !setup->no_layers) {
         status = measure_layers(b, err);
     }
     if (status == MHE_OK) {

@@ -10,6 +10,7 @@ typedef struct bench_setup {
     const mhe_host *host;
     int32_t repeats;   /* runs of each variant, in alternation */
     int32_t estimates; /* of a run at most; 0: all */
+    int32_t no_layers; /* whole runs alone */
 } bench_setup;
 
 /* Percentiles of the times of one call, s. */

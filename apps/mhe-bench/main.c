@@ -4,6 +4,7 @@
 #include "console.h"
 #include "picture.h"
 #include "report.h"
+#include "scale.h"
 #include <mhe/outbox.h>
 
 #include <stdlib.h>
@@ -80,6 +81,11 @@ static mhe_status run(const arguments *a, const mhe_host *host, mhe_error *err) 
     mhi_registry *registry = NULL;
     mhe_status status = mhi_registry_create(host, &registry, err);
     if (status != MHE_OK) {
+        return status;
+    }
+    if (a->mode == 1) {
+        status = scale_measure(a, registry, host, err);
+        mhi_registry_free(registry);
         return status;
     }
     variants v;

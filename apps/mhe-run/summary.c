@@ -214,6 +214,9 @@ mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *
     cJSON *iterations = cJSON_AddObjectToObject(root, "iterations");
     add_number(iterations, "mean", tally_iterations(&s->tally));
     add_number(iterations, "max", s->tally.iterations_max);
+    cJSON *programs = cJSON_AddObjectToObject(root, "quadratic_programs");
+    add_number(programs, "solved", (double)s->tally.programs);
+    add_number(programs, "fallbacks", (double)s->tally.fallbacks);
     add_number(root, "deadline_misses", s->tally.n_deadline);
     add_number(root, "peak_rss_mb", tally_peak_rss_mb());
     add_number(root, "node", s->info.node);

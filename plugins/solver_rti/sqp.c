@@ -309,12 +309,15 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
         info->primal_residual = s->prepared ? largest_gap(s) : INFINITY;
         return MHE_OK;
     }
+    const int32_t programs = s->qp.programs, fallbacks = s->qp.fallbacks;
     if (begin(s)) {
         info->outcome = iterate(s, control, &info->iterations);
         if (s->failure == MHE_OK) {
             write_result(s, solution, info);
         }
     }
+    info->programs = s->qp.programs - programs;
+    info->fallbacks = s->qp.fallbacks - fallbacks;
     info->evaluation_time = s->seconds;
     s->control = NULL;
     return s->failure;

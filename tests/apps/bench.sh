@@ -65,6 +65,11 @@ for arguments in '' --quick; do
     has windows.txt 'horizon.window=3' 'horizon.window=7' 'horizon.window=15'
 done
 
+# Models that are made up: every size estimates what it was simulated with.
+"$bench" --scale --quick --repeats 1 --out scale > scale.txt 2> err.txt || fail "--scale: $(cat err.txt)"
+has scale.txt 'exponent of the time in muscles' 'in coordinates, 7 to 14 at 80 muscles'
+[ "$(awk '$1 ~ /^[0-9]+$/ && $9 < 1 && $4 > 0' scale.txt | wc -l)" -eq 3 ] || fail "--scale: $(cat scale.txt)"
+
 # refused 'TEXT IN THE MESSAGE' ARGUMENTS...: exit status 2, one line, nothing written
 refused() {
     text=$1

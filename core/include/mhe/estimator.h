@@ -203,16 +203,18 @@ typedef struct mhe_estimate {
     double evaluation_time;   /* s of it spent on costs, dynamics and their derivatives */
     int32_t phase;            /* MHE_PHASE_*: settling or running */
     int32_t n_tracked;
-    uint32_t tracked_size;      /* stride of `tracked` */
-    const mhe_tracked *tracked; /* [n_tracked] what of each channel this node tracked. Of a control
-                                 * at the last node, which has none: what the one before it did */
-    const mhe_layout *layout;   /* names and places of what follows: every block of the system */
-    const double *states;       /* [layout->n_x] */
-    const double *controls;     /* [layout->n_u]; at the last node those that lead to it */
-    const double *inputs;       /* [layout->n_w] of forces, at this time; NULL: there are none */
-    const double *reactions;    /* [n_joints x 6] force, N, and moment, N m, on the child at the
-                                 * joint's centre; NULL: output.reactions is none, or NaN: none
-                                 * could be found */
+    uint32_t tracked_size;       /* stride of `tracked` */
+    const mhe_tracked *tracked;  /* [n_tracked] what of each channel this node tracked. Of a control
+                                  * at the last node, which has none: what the one before it did */
+    const mhe_layout *layout;    /* names and places of what follows: every block of the system */
+    const double *states;        /* [layout->n_x] */
+    const double *controls;      /* [layout->n_u]; at the last node those that lead to it */
+    const double *inputs;        /* [layout->n_w] of forces, at this time; NULL: there are none */
+    const double *reactions;     /* [n_joints x 6] force, N, and moment, N m, on the child at the
+                                  * joint's centre; NULL: output.reactions is none, or NaN: none
+                                  * could be found */
+    int32_t programs, fallbacks; /* quadratic programs of its solve, and those of them that the
+                                  * solver's fast method gave up and the safe one solved */
 } mhe_estimate;
 
 /* Values of a block of an estimate [block->count]; NULL: it is no state or control. [any] */

@@ -140,6 +140,8 @@ typedef struct mhe_solve_info {
     double kkt_residual;    /* largest violation of the optimality conditions, in its own scaling */
     double primal_residual; /* largest |x_{k+1} - F_k| */
     double evaluation_time; /* s spent in evaluate() */
+    int32_t programs;       /* quadratic programs solved; 0 where the solver has none */
+    int32_t fallbacks;      /* those of them that its fast method gave up and the safe one solved */
 } mhe_solve_info;
 
 typedef struct mhe_solver_ops {

@@ -180,6 +180,8 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
         estimate->latency = mhi_seconds() - e->pace.arrival;
         estimate->solve_time = estimate->latency + e->pace.ahead;
         estimate->iterations = info.iterations;
+        estimate->programs = info.programs;
+        estimate->fallbacks = info.fallbacks;
         estimate->kkt_residual = info.kkt_residual;
         estimate->evaluation_time = info.evaluation_time;
     }

@@ -109,7 +109,7 @@ static void set_proximal_weight(mhe_estimator *e, double factor) {
  * its first state still free: so the deadline holds for these frames, too. */
 static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
     mhe_status status = MHE_OK;
-    int32_t iterations = 0, cut = 0;
+    int32_t iterations = 0, programs = 0, fallbacks = 0, cut = 0;
     double factor = 1, evaluation_time = 0;
     while (!mhi_phase_settled(e) && !cut && status == MHE_OK) {
         memcpy(e->window.prior_centre, e->window.solution.x,
@@ -117,6 +117,8 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
         set_proximal_weight(e, factor);
         status = solve_once(e, info, err);
         iterations += info->iterations;
+        programs += info->programs;
+        fallbacks += info->fallbacks;
         evaluation_time += info->evaluation_time;
         const int32_t converged = status == MHE_OK && info->outcome == MHE_SOLVE_CONVERGED;
         const int32_t over = status == MHE_OK && info->outcome == MHE_SOLVE_DEADLINE;
@@ -135,6 +137,8 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
         set_proximal_weight(e, 0);
     }
     info->iterations = iterations;
+    info->programs = programs;
+    info->fallbacks = fallbacks;
     info->evaluation_time = evaluation_time;
     return status;
 }
