@@ -86,6 +86,22 @@ def emg_level(folder):
                   for m in study.levels("marker_noise", LEVELS)])
 
 
+def emg_noise(folder):
+    """Force and joint angle errors of the paper's high marker weight and of EMG as a measurement, same seeds."""
+    def means(name):
+        sums = {}
+        for r in Study(folder, name)["results"]:
+            if r["weight"] == "high" and r["emg_objective"] in TRACKING and r["counted"]:
+                sums.setdefault((r["marker_noise"], r["emg_objective"], r["cocontraction"]), []).append((r["force_n"], r["q_deg"]))
+        return {k: [sum(x[i] for x in v) / len(v) for i in (0, 1)] for k, v in sums.items()}
+    paper, own = means("noise"), means("emg-noise")
+    rows = [[m, e, *(f"{number(paper[m, e, c][0])} -> {number(own[m, e, c][0])} ({100 * (own[m, e, c][0] / paper[m, e, c][0] - 1):+.0f} %)"
+                     for c in LEVELS),
+             f"{number(sum(paper[m, e, c][1] for c in LEVELS) / 4)} -> {number(sum(own[m, e, c][1] for c in LEVELS) / 4)}"]
+            for m in LEVELS for e in TRACKING]
+    return table(["marker noise", "EMG noise", *(f"force, co-contraction {c} (N)" for c in LEVELS), "joint angles (deg)"], rows)
+
+
 def limits(folder):
     return table(["formulation", "passive force", "tolerance", "EMG delay (samples)", "q (deg)", "force (N)", "markers (mm)"],
                  [[r["formulation"], r["passive_force"], f"{r['tolerance']:.0e}".replace("e-0", "e-"), number(r["emg_delay"]),
@@ -101,7 +117,7 @@ def muscles_limits(folder):
 BLOCKS = {
     "verdicts-windows": verdicts("windows"), "verdicts-noise": verdicts("noise"), "rates": rates, "forces": forces,
     "angles": angles, "anova-force": anova("force"), "anova-angles": anova("angles"), "runs": runs, "subset": subset,
-    "emg-level": emg_level, "limits": limits,
+    "emg-level": emg_level, "limits": limits, "emg-noise": emg_noise,
     "muscles-limits": muscles_limits,
 }
 

@@ -44,9 +44,9 @@ void rig_open(emg_rig *rig) {
     rig->run.emg.n_channels = 2;
     rig->run.emg.channels = calloc(2, sizeof(mhi_emg_channel));
     rig->run.emg.channels[0] = (mhi_emg_channel){
-        .name = "A", .muscles = {a, 2}, .gains = {gains, 2}, .gain = 1, .mvc = 0.001};
+        .name = "A", .muscles = {a, 2}, .gains = {gains, 2}, .gain = 1, .delay = -1, .mvc = 0.001};
     rig->run.emg.channels[1] =
-        (mhi_emg_channel){.name = "B", .muscles = {b, 1}, .gain = 1, .mvc = 1};
+        (mhi_emg_channel){.name = "B", .muscles = {b, 1}, .gain = 1, .delay = -1, .mvc = 1};
 }
 
 void rig_close(emg_rig *rig) {

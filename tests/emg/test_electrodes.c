@@ -299,6 +299,39 @@ static void zero_phase_follows_without_delay(void **state) {
     rig_close(&rig);
 }
 
+/* Lloyd and Besier (2003): excitation (exp(A e) - 1) / (exp(A) - 1), one A for a channel or one a
+ * muscle; a channel with a delay of its own shows what was that much before, the others do not. */
+static void channels_have_shapes_and_delays(void **state) {
+    (void)state;
+    const double shapes[] = {-2, 0}, one[] = {-1};
+    double plain[3 * FRAMES], bent[3 * FRAMES];
+    for (int32_t late = 0; late < 2; late++) {
+        emg_rig rig;
+        rig_open(&rig);
+        mhi_table *table = rig_table(ROWS);
+        assert_int_equal(rig_read(&rig, table, FRAMES, plain), MHE_OK);
+        mhi_table_free(table);
+        rig.run.emg.channels[0].shape = (mhe_real_list){shapes, 2};
+        rig.run.emg.channels[1].shape = (mhe_real_list){one, 1};
+        rig.run.emg.channels[1].delay = late ? 0.3 + rig.report.filter_delay : -1;
+        table = rig_table(ROWS);
+        assert_int_equal(rig_read(&rig, table, FRAMES, bent), MHE_OK);
+        mhi_table_free(table);
+        int32_t compared = 0;
+        const int32_t frames = late ? 30 : 0;
+        for (int32_t k = 60; k < FRAMES; k++) {
+            const double *then = plain + 3 * (k - frames), *now = plain + 3 * k;
+            assert_near(bent[3 * k], expm1(-2 * now[0]) / expm1(-2), 1e-12);
+            assert_true(bent[3 * k + 1] == now[1]); /* A = 0 */
+            assert_near(bent[3 * k + 2], expm1(-then[2]) / expm1(-1), 1e-12);
+            assert_true(bent[3 * k] > now[0] || now[0] == 0);
+            compared += now[0] > 0.01;
+        }
+        assert_true(compared > 50);
+        rig_close(&rig);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(live_and_recorded_are_the_same_bits),
@@ -312,6 +345,7 @@ int main(void) {
         cmocka_unit_test(dead_channels_are_told_and_missing),
         cmocka_unit_test(three_rows_are_no_signal),
         cmocka_unit_test(zero_phase_follows_without_delay),
+        cmocka_unit_test(channels_have_shapes_and_delays),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -80,7 +80,9 @@ typedef struct mhi_emg_channel {
     mhe_text_list muscles;
     mhe_real_list gains; /* one a muscle; n = 0: all 1 */
     double gain;
-    double mvc; /* envelope at maximal voluntary contraction; 0: from mvc_file, else 1 */
+    mhe_real_list shape; /* of each of these muscles, or one; n = 0: linear */
+    double delay;        /* s; -1: that of the section */
+    double mvc;          /* envelope at maximal voluntary contraction; 0: from mvc_file, else 1 */
     const mhi_node *node;
 } mhi_emg_channel;
 

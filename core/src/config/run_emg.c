@@ -18,6 +18,11 @@ static mhe_status check_channel(const mhi_run *run, int32_t i, mhe_error *err) {
                            LIST ": channel '%s' has %d gains for %d muscles", c->name,
                            (int)c->gains.n, (int)c->muscles.n);
     }
+    if (c->shape.n > 1 && c->shape.n != c->muscles.n) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
+                           LIST ": channel '%s' has %d shape factors for %d muscles", c->name,
+                           (int)c->shape.n, (int)c->muscles.n);
+    }
     for (int32_t k = 0; k < i; k++) {
         if (strcmp(run->emg.channels[k].name, c->name) == 0) {
             return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,

@@ -133,6 +133,13 @@ static const mhe_option channel_options[] = {
     MHE_OPT_REALS(mhi_emg_channel, gains, 0, 0, 1e6, "1",
                   "Factor of each of these muscles; none: all 1."),
     MHE_OPT_REAL(mhi_emg_channel, gain, 1, 0, 1e6, "1", "Factor of the whole channel."),
+    MHE_OPT_REALS(
+        mhi_emg_channel, shape, 0, -3, 0, "1",
+        "Shape factor A: excitation (exp(A e) - 1) / (exp(A) - 1) of the EMG e (Lloyd and "
+        "Besier 2003, doi:10.1016/S0021-9290(03)00010-1), one or one a muscle; none, or "
+        "0: linear."),
+    MHE_OPT_REAL(mhi_emg_channel, delay, -1, -1, 1, "s",
+                 "Electromechanical delay of this channel; -1: that of the section."),
     MHE_OPT_REAL(mhi_emg_channel, mvc, 0, 0, DBL_MAX, "unit of the column",
                  "Envelope at maximal voluntary contraction; 0: from mvc_file, else 1."),
 };

@@ -89,7 +89,9 @@ static mhe_status lay_wires(mhi_electrodes *e, const mhi_run *run, const mhe_des
                                    name, owner[muscle], c->name);
             }
             owner[muscle] = c->name;
-            e->wires[e->n_wires++] = (wire){i, muscle, c->gains.n > 0 ? c->gains.values[k] : 1};
+            e->wires[e->n_wires++] =
+                (wire){i, muscle, c->gains.n > 0 ? c->gains.values[k] : 1,
+                       c->shape.n == 0 ? 0 : c->shape.values[c->shape.n > 1 ? k : 0]};
         }
     }
     return MHE_OK;
@@ -98,7 +100,7 @@ static mhe_status lay_wires(mhi_electrodes *e, const mhi_run *run, const mhe_des
 /* ---- the stream ---- */
 
 static mhe_status take_arrays(mhi_electrodes *e, mhe_error *err) {
-    const double kept = (e->shift + KEPT) * e->rate + 16;
+    const double kept = (e->longest + KEPT) * e->rate + 16;
     if (!(kept < 1e8)) {
         return mhe_fail(err, MHE_E_INPUT, "EMG at %g Hz: that cannot be", e->rate);
     }
@@ -145,9 +147,15 @@ mhe_status mhi_electrodes_open(const mhi_run *run, const mhe_description *model,
     }
     if (status == MHE_OK) {
         const double delay = mhi_envelope_delay(e->envelope);
-        e->shift = fmax(0, o->delay - delay);
-        e->lag = fmax(0, delay - o->delay);
-        status = take_arrays(e, err);
+        e->shift = MHI_TAKE(&e->arena, double, e->n_channels);
+        for (int32_t i = 0; i < e->n_channels && e->shift != NULL; i++) {
+            const double own = o->channels[i].delay < 0 ? o->delay : o->channels[i].delay;
+            e->shift[i] = fmax(0, own - delay);
+            e->longest = fmax(e->longest, e->shift[i]);
+            e->lag = fmax(e->lag, delay - own);
+        }
+        status =
+            e->shift == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : take_arrays(e, err);
     }
     if (status != MHE_OK) {
         mhi_electrodes_close(e);
@@ -224,44 +232,64 @@ static int32_t newest_before(const mhi_electrodes *e, double time) {
     return slot >= 0 && time - e->times[slot] > 1.5 / e->rate + STALE ? -1 : slot;
 }
 
+/* Normalised EMG as excitation. */
+static double taken(const mhi_electrodes *e, const wire *w, double value) {
+    const double emg = isnan(value) ? NAN : fmin(fmax(value * w->factor, 0), e->max);
+    return w->shape == 0 ? emg : expm1(w->shape * emg) / expm1(w->shape);
+}
+
 void mhi_electrodes_at(const mhi_electrodes *e, double time, double *emg) {
-    const int32_t slot = newest_before(e, time - e->shift);
     for (int32_t i = 0; i < e->n_muscles; i++) {
         emg[i] = NAN;
     }
-    for (int32_t i = 0; i < e->n_wires && slot >= 0; i++) {
+    double shift = NAN;
+    int32_t slot = -1;
+    for (int32_t i = 0; i < e->n_wires; i++) {
         const wire *w = &e->wires[i];
-        const double value = e->values[(ptrdiff_t)slot * e->n_channels + w->channel] * w->factor;
-        emg[w->muscle] = isnan(value) ? NAN : fmin(fmax(value, 0), e->max);
+        if (shift != e->shift[w->channel]) { /* alike in most channels */
+            shift = e->shift[w->channel];
+            slot = newest_before(e, time - shift);
+        }
+        if (slot >= 0) {
+            emg[w->muscle] = taken(e, w, e->values[(ptrdiff_t)slot * e->n_channels + w->channel]);
+        }
+    }
+}
+
+/* Samples of the ring from a time on, before another: [*first, *end). */
+static void between(const mhi_electrodes *e, double from, double to, int64_t *first, int64_t *end) {
+    const int64_t oldest = e->n_pushed < e->capacity ? 0 : e->n_pushed - e->capacity;
+    *end = e->n_pushed;
+    while (*end > oldest && e->times[(*end - 1) % e->capacity] >= to - MHI_SAME_TIME) {
+        --*end;
+    }
+    *first = *end;
+    while (*first > oldest && e->times[(*first - 1) % e->capacity] >= from - MHI_SAME_TIME) {
+        --*first;
     }
 }
 
 void mhi_electrodes_mean(const mhi_electrodes *e, double time, double span, double *emg) {
-    const double from = time - e->shift, to = from + span;
+    double shift = NAN;
+    int64_t first = 0, end = 0;
     mhi_electrodes_at(e, time, emg);
-    if (!(span > 0) || e->n_pushed == 0) {
-        return;
-    }
-    const int64_t oldest = e->n_pushed < e->capacity ? 0 : e->n_pushed - e->capacity;
-    int64_t end = e->n_pushed, first;
-    while (end > oldest && e->times[(end - 1) % e->capacity] >= to - MHI_SAME_TIME) {
-        end--;
-    }
-    first = end;
-    while (first > oldest && e->times[(first - 1) % e->capacity] >= from - MHI_SAME_TIME) {
-        first--;
-    }
-    for (int32_t i = 0; i < e->n_wires && first < end; i++) {
+    for (int32_t i = 0; i < e->n_wires && span > 0; i++) {
         const wire *w = &e->wires[i];
+        if (shift != e->shift[w->channel]) {
+            shift = e->shift[w->channel];
+            between(e, time - shift, time - shift + span, &first, &end);
+        }
         double sum = 0;
         int32_t n = 0;
         for (int64_t k = first; k < end; k++) {
             const ptrdiff_t slot = (ptrdiff_t)(k % e->capacity) * e->n_channels;
-            const double value = e->values[slot + w->channel] * w->factor;
+            const double value = taken(e, w, e->values[slot + w->channel]);
             n += !isnan(value);
-            sum += isnan(value) ? 0 : fmin(fmax(value, 0), e->max);
+            sum += isnan(value) ? 0 : value;
         }
-        emg[w->muscle] = n > 0 ? sum / n : NAN;
+        if (first < end) {
+            emg[w->muscle] = n > 0 ? sum / n : NAN;
+        }
     }
 }
 

@@ -11,6 +11,7 @@
 typedef struct wire { /* from a channel to a muscle */
     int32_t channel, muscle;
     double factor;
+    double shape; /* A; 0: linear */
 } wire;
 
 struct mhi_electrodes {
@@ -19,7 +20,9 @@ struct mhi_electrodes {
     wire *wires;
     mhi_envelope *envelope;
     double rate, offset, max;
-    double shift, lag;           /* s */
+    double lag;                  /* s, the longest of a channel */
+    double longest;              /* s, of the shifts */
+    double *shift;               /* [n_channels] s */
     double *raw, *scale, *peaks; /* [n_channels]; peaks of scaled values, before the cut */
     double *times, *values;      /* rings [capacity], [capacity x n_channels] */
     int64_t n_pushed;
