@@ -209,6 +209,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     }
     drop_outliers(e, e->begin.distance, nearest);
     guess_rest(e);
+    mhi_pace_measure(e);
     mhi_ocp_set_begins(e->ocp, 1);
     status = mhi_ocp_carry(e->ocp, e->window.guess_x, e->window.guess_u, err);
     if (status != MHE_OK) {
