@@ -12,7 +12,8 @@ struct layers {
     const mhe_system *system;
     void *system_context;
     const mhe_stage_problem *problem;
-    int32_t next; /* point */
+    int32_t next;            /* point */
+    int32_t begin[N_LAYERS]; /* the point at which each goes on: none depends on others' calls */
     const mhe_model_ops *model;
     void *model_self, *model_context; /* a skeleton of its own */
     mhe_kinematics kinematics;
@@ -146,9 +147,11 @@ mhe_status layers_time(layers *l, int32_t layer, int32_t calls, double *seconds,
     mhi_work_begin(mhi_ocp_work(mhi_estimator_ocp(l->rig->estimator)), 0, 0); /* no frame's bound */
     const double begin = measure_seconds();
     double again = 0;
+    l->next = l->begin[layer];
     for (int32_t i = 0; i < calls && status == MHE_OK; i++) {
         status = layer == LAYER_INTERVAL_AGAIN ? time_again(l, &again, err) : call(l, layer, err);
     }
+    l->begin[layer] = l->next;
     *seconds = layer == LAYER_INTERVAL_AGAIN ? again : measure_seconds() - begin;
     return status;
 }

@@ -16,18 +16,15 @@ static void keep_point(rig *r, const mhe_system *face, const mhe_estimate *e) {
     if (r->n_points == RIG_POINTS_MAX) {
         return;
     }
-    const size_t n_q = sizeof(double) * (size_t)face->n_q, n_m = sizeof(double) * (size_t)face->n_m;
+    const size_t n_q = sizeof(double) * (size_t)face->n_q;
     double *x = r->x + (ptrdiff_t)r->n_points * face->n_x;
     double *u = r->u + (ptrdiff_t)r->n_points * face->n_u;
     memcpy(x, e->q, n_q);
     memcpy(x + face->n_q, e->qdot, n_q);
-    memcpy(u, e->excitation == NULL ? e->activation : e->excitation, n_m);
+    memcpy(u, e->controls, sizeof(double) * (size_t)face->n_u);
     if (mhi_system_equilibrium(mhi_ocp_context(mhi_estimator_ocp(r->estimator)), x, x + face->n_q,
                                e->activation, x, NULL) != MHE_OK) {
         return;
-    }
-    if (face->n_r > 0) {
-        memcpy(u + face->n_m, e->residual, sizeof(double) * (size_t)face->n_r);
     }
     r->n_points++;
 }

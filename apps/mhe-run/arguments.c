@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "arguments.h"
 
+#include "batch.h"
+
 #include <mhe/library.h>
 
 static const words_command commands[] = {
@@ -42,6 +44,47 @@ static const words_option options[] = {
      .kind = WORDS_TEXT,
      .at = AT(config),
      .mode = MODE_CHECK},
+    {.name = "--batch",
+     .value = "LIST",
+     .help =
+         "the trials of a session over the processors, each in a folder of its own below --out: "
+         "LIST is a table (.csv) with a line a trial and columns 'name' and keys of the config, "
+         "or a folder of recordings, or of configs. Started again it goes on where it was; "
+         "batch.csv and batch.html show all trials",
+     .kind = WORDS_TEXT,
+     .at = AT(batch),
+     .mode = MODE_BATCH},
+    {.name = "--workers",
+     .value = "N",
+     .help = "processes of --batch; as many as there are processors",
+     .kind = WORDS_INT,
+     .at = AT(n_workers),
+     .low = 1,
+     .high = BATCH_WORKERS_MAX},
+    {.name = "--shard",
+     .value = "I/N",
+     .help = "0/8 ... 7/8 does one of eight parts of --batch, in a process or on a machine of its "
+             "own",
+     .kind = WORDS_OTHER,
+     .at = AT(shard),
+     .take = cluster_take_part},
+    {.name = "--engine",
+     .value = "slurm",
+     .help = "hands --batch to a cluster, as a job array of --tasks",
+     .kind = WORDS_TEXT,
+     .at = AT(engine)},
+    {.name = "--tasks",
+     .value = "N",
+     .help = "parts of the array (16)",
+     .kind = WORDS_INT,
+     .at = AT(n_tasks),
+     .low = 1,
+     .high = CLUSTER_TASKS_MAX},
+    {.name = "--option",
+     .value = "WORD",
+     .help = "goes to sbatch as it is: --option --partition=fast; may be given often",
+     .kind = WORDS_LIST,
+     .at = AT(option)},
     {.name = "--list-plugins",
      .help = "the plugins that are found, and the files that were refused",
      .kind = WORDS_FLAG,
@@ -71,6 +114,9 @@ const words_program arguments_program = {
         "  mhe-run CONFIG.yaml [--out DIR] [--set path.to.key=value]... [--quiet] [--realtime] "
         "[--trust]\n"
         "  mhe-run --check CONFIG.yaml [--set path.to.key=value]... [--trust]\n"
+        "  mhe-run [CONFIG.yaml] --batch LIST|FOLDER [--out DIR] [--set path.to.key=value]... "
+        "[--workers N]\n"
+        "      [--shard I/N | --engine slurm [--tasks N] [--option WORD]...]\n"
         "  mhe-run --list-plugins [--json]\n"
         "  mhe-run --describe ID [--json | --markdown]\n"
         "  mhe-run --version | --help\n",
@@ -83,4 +129,4 @@ const words_program arguments_program = {
     .mode = AT(mode),
     .operand = AT(config),
     .others = AT(others),
-    .modes_without = 1u << MODE_LIST | 1u << MODE_DESCRIBE};
+    .modes_without = 1u << MODE_LIST | 1u << MODE_DESCRIBE | 1u << MODE_BATCH};

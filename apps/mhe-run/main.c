@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mhe-run: estimates joint angles, activations and muscle forces; asks plugins what they are. */
 #include "arguments.h"
+#include "batch.h"
 #include "console.h"
 #include "track.h"
 
@@ -51,12 +52,14 @@ static mhe_status run_config(const arguments *a, const mhe_host *host, mhe_error
 
 int main(int argc, char **argv) {
     const mhe_host host = console_host("mhe-run");
-    arguments a = {0};
+    arguments a = {.shard = {0, 1}, .n_tasks = 16};
     mhe_error err = {0};
     int32_t command = 0, outcome = WORDS_RUN;
     mhe_status status = words_parse(&arguments_program, argc, argv, &a, &command, &outcome, &err);
     if (status == MHE_OK && outcome == WORDS_RUN) {
         status = a.mode == MODE_LIST || a.mode == MODE_DESCRIBE ? show_plugins(&a, &host, &err)
+                 : a.mode == MODE_BATCH && a.engine != NULL     ? batch_submit(&a, &host, &err)
+                 : a.mode == MODE_BATCH                         ? batch_run(&a, &host, &err)
                                                                 : run_config(&a, &host, &err);
     }
     words_free(&arguments_program, &a);

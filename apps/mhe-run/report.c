@@ -2,6 +2,7 @@
 #include "report.h"
 
 #include "base/pi.h"
+#include "escape.h"
 #include "rows.h"
 
 #include <errno.h>
@@ -12,25 +13,6 @@
 #define WIDTH 300.0
 #define HEIGHT 120.0
 #define POINTS 600 /* of a line; more would not be seen */
-
-/* Text as it may stand in HTML. */
-static void add_escaped(mhi_text *out, const char *text) {
-    for (; *text != '\0'; text++) {
-        switch (*text) {
-        case '<':
-            mhi_text_add(out, "&lt;");
-            break;
-        case '>':
-            mhi_text_add(out, "&gt;");
-            break;
-        case '&':
-            mhi_text_add(out, "&amp;");
-            break;
-        default:
-            mhi_text_add(out, "%c", *text);
-        }
-    }
-}
 
 static double value_at(const rows *t, int32_t row, int32_t column, double scale) {
     return scale * t->is.values[(ptrdiff_t)row * t->is.n_columns + column];

@@ -14,7 +14,7 @@ const char *const results_names[] = {
     "torques.sto",   "torques.csv",   "markers.trc",  "markers.csv", "marker_residuals.sto",
     "emg.sto",       "emg.csv",       "quality.sto",  "quality.csv", "marker_residuals.csv",
     "results.mat",   "config.yaml",   "summary.json", "report.html", "estimates.gp",
-    "estimates.svg"};
+    "estimates.svg", "reactions.sto", "reactions.csv"};
 const int32_t results_n_names = (int32_t)(sizeof results_names / sizeof results_names[0]);
 
 /* One table in all its formats. */
@@ -26,8 +26,9 @@ typedef struct series {
 
 struct results {
     mhe_estimator_info info;
-    series estimates, motion, forces, markers, residuals, torques, emg, quality;
-    matlab *matlab; /* NULL: no such file */
+    series estimates, motion, forces, markers, residuals, torques, emg, quality, reactions;
+    matlab *matlab;             /* NULL: no such file */
+    const mhe_block *actuators; /* NULL: none are driven */
     int32_t csv;
     double *row; /* of the widest file */
     mhi_arena arena;
@@ -80,6 +81,29 @@ static mhe_status open_series(results *r, mhe_outbox *outbox, const char *name, 
     return status == MHE_OK ? open_others(r, outbox, name, labels, s, err) : status;
 }
 
+/* Whether block i of the system is of states that no other column shows: what muscles have beside
+ * their activation ("fiber_length"). */
+static const mhe_block *own_states(const mhe_layout *layout, int32_t i) {
+    static const char *const shown[] = {"q", "qdot", "activation"};
+    const mhe_block *block = mhe_layout_at(layout, i);
+    int32_t known = block->role != MHE_ROLE_STATE;
+    for (size_t k = 0; k < sizeof shown / sizeof shown[0]; k++) {
+        known |= strcmp(block->name, shown[k]) == 0;
+    }
+    return known ? NULL : block;
+}
+
+static void add_own_states(results *r, names *labels) {
+    for (int32_t i = 0; i < r->info.layout->n_blocks; i++) {
+        const mhe_block *block = own_states(r->info.layout, i);
+        const char *prefix = block == NULL ? "" : mhi_arena_format(&r->arena, "%s_", block->name);
+        labels->failed |= prefix == NULL;
+        if (block != NULL && prefix != NULL) {
+            add_names(labels, prefix, block->entry_names, block->count, "");
+        }
+    }
+}
+
 static mhe_status open_states(results *r, mhe_outbox *outbox, names *labels, mhe_error *err) {
     const mhe_estimator_info *f = &r->info;
     add_names(labels, "q_", f->coordinate_names, f->n_q, "");
@@ -88,6 +112,7 @@ static mhe_status open_states(results *r, mhe_outbox *outbox, names *labels, mhe
     if (f->formulation == 0) {
         add_names(labels, "e_", f->muscle_names, f->n_muscles, "");
     }
+    add_own_states(r, labels);
     mhe_status status =
         open_series(r, outbox, "estimates", "estimates", labels, &r->estimates, err);
     labels->n = 0;
@@ -116,6 +141,16 @@ static mhe_status open_markers(results *r, mhe_outbox *outbox, const mhe_recordi
     return status == MHE_OK ? open_others(r, outbox, "markers", labels, &r->markers, err) : status;
 }
 
+static mhe_status open_reactions(results *r, mhe_outbox *outbox, names *labels, mhe_error *err) {
+    static const char *const parts[] = {"_fx", "_fy", "_fz", "_mx", "_my", "_mz"};
+    labels->n = 0;
+    for (int32_t i = 0; i < 6 * r->info.n_joints; i++) {
+        add_names(labels, "", &r->info.joint_names[i / 6], 1, parts[i % 6]);
+    }
+    return open_series(r, outbox, "reactions", "what joints transmit (N, N m)", labels,
+                       &r->reactions, err);
+}
+
 static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_info *recording,
                            const char **room, mhe_error *err) {
     static const char *quality[] = {"status",   "iterations", "kkt_residual",
@@ -131,6 +166,9 @@ static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_i
     labels.n = 0;
     add_names(&labels, "moment_", f->coordinate_names, f->n_q, "");
     add_names(&labels, "residual_", f->coordinate_names, f->n_residual_torques, "");
+    if (r->actuators != NULL) {
+        add_names(&labels, "actuator_", r->actuators->entry_names, r->actuators->count, "");
+    }
     if (status == MHE_OK) {
         status =
             open_series(r, outbox, "torques", "joint moments by muscles, residual torques (N m)",
@@ -150,6 +188,9 @@ static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_i
     if (status == MHE_OK) {
         status = open_series(r, outbox, "emg", "EMG that was tracked", &labels, &r->emg, err);
     }
+    if (status == MHE_OK && f->n_joints > 0) {
+        status = open_reactions(r, outbox, &labels, err);
+    }
     const names of_quality = {.owner = r, .list = quality, .n = 6};
     return status == MHE_OK ? open_series(r, outbox, "quality", "quality of each estimate",
                                           &of_quality, &r->quality, err)
@@ -161,11 +202,13 @@ mhe_status results_open(mhe_outbox *outbox, const mhe_estimator_info *info,
                         mhe_error *err) {
     *result = NULL;
     mhi_arena arena = {0};
-    const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers + 6;
+    const int32_t widest = 4 * info->n_q + 2 * info->n_muscles + 3 * info->n_markers +
+                           6 * info->n_joints + info->layout->n_x + info->layout->n_u + 6;
     results *r = MHI_TAKE(&arena, results, 1);
     const char **room = MHI_TAKE(&arena, const char *, widest);
     if (r != NULL) {
         r->info = *info;
+        r->actuators = mhe_layout_find(info->layout, MHE_ROLE_CONTROL, "actuator");
         r->csv = strstr(formats, "csv") != NULL;
         r->row = MHI_TAKE(&arena, double, widest);
         r->arena = arena;
@@ -216,7 +259,13 @@ mhe_status results_write(results *r, const mhe_estimate *e, const double *distan
     n = put(r, n, e->qdot, f->n_q);
     n = put(r, n, e->activation, f->n_muscles);
     if (e->excitation != NULL) {
-        (void)put(r, n, e->excitation, f->n_muscles);
+        n = put(r, n, e->excitation, f->n_muscles);
+    }
+    for (int32_t i = 0; i < f->layout->n_blocks; i++) {
+        const mhe_block *block = own_states(f->layout, i);
+        if (block != NULL) {
+            n = put(r, n, e->states + block->first, block->count);
+        }
     }
     mhe_status status = write_row(&r->estimates, e->time, r->row, err);
     if (status == MHE_OK) {
@@ -237,8 +286,14 @@ mhe_status results_write(results *r, const mhe_estimate *e, const double *distan
     }
     if (status == MHE_OK) {
         n = put(r, 0, e->moment, f->n_q);
-        (void)put(r, n, e->residual, f->n_residual_torques);
+        n = put(r, n, e->residual, f->n_residual_torques);
+        if (r->actuators != NULL) {
+            (void)put(r, n, mhe_estimate_block(e, r->actuators), r->actuators->count);
+        }
         status = write_row(&r->torques, e->time, r->row, err);
+    }
+    if (status == MHE_OK && e->reactions != NULL) {
+        status = write_row(&r->reactions, e->time, e->reactions, err);
     }
     if (status == MHE_OK) {
         const double quality[] = {e->status,           e->iterations, e->kkt_residual,

@@ -168,6 +168,30 @@ static void add_channels(cJSON *root, const summary *s) {
     }
 }
 
+/* Largest reactions by joint, and residual forces beside the largest load. */
+static void add_peaks(cJSON *root, const summary *s) {
+    const peaks *p = &s->peaks;
+    cJSON *list = p->n_joints > 0 ? cJSON_AddObjectToObject(root, "reactions") : NULL;
+    for (int32_t i = 0; i < p->n_joints; i++) {
+        cJSON *one = cJSON_AddObjectToObject(list, s->info.joint_names[i]);
+        add_number(one, "force_max", p->force[i]);
+        add_number(one, "time", p->time[i]);
+        add_number(one, "moment_max", p->moment[i]);
+    }
+    list = p->n_residuals > 0 ? cJSON_AddObjectToObject(root, "residuals") : NULL;
+    for (int32_t i = 0; i < p->n_residuals; i++) {
+        cJSON *one = cJSON_AddObjectToObject(list, s->info.coordinate_names[i]);
+        add_number(one, "max", p->residual[i]);
+        add_number(one, "rms", sqrt(p->squares[i] / p->n_estimates));
+        if (p->load > 0) {
+            add_number(one, "share_of_load", p->residual[i] / p->load);
+        }
+    }
+    if (p->load > 0) {
+        add_number(root, "load_max", p->load);
+    }
+}
+
 mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *err) {
     tally_sort(&s->tally);
     cJSON *root = cJSON_CreateObject();
@@ -203,6 +227,7 @@ mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *
     if (s->has_rmse) {
         add_rmse(root, &s->rmse);
     }
+    add_peaks(root, s);
     add_verdict(root, s);
     add_channels(root, s);
     char *text = cJSON_Print(root);

@@ -5,6 +5,7 @@
 
 #include "base/text.h"
 #include "live.h"
+#include "peaks.h"
 #include "tally.h"
 
 #include <mhe/findings.h>
@@ -14,6 +15,7 @@ typedef struct summary {
     mhe_recording_info recording;
     int32_t n_pushed;
     tally tally;
+    peaks peaks;
     double elapsed; /* s, whole loop */
     int32_t has_rmse;
     mhe_rmse rmse;

@@ -105,6 +105,9 @@ static mhe_status open_results(tracking *t, mhe_error *err) {
         status = results_open(t->outbox, &t->summary.info, &t->summary.recording, formats,
                               &t->results, err);
     }
+    if (status == MHE_OK) {
+        status = peaks_open(&t->summary.peaks, &t->summary.info, err);
+    }
     mhe_free(formats);
     return status;
 }
@@ -151,6 +154,7 @@ static mhe_status take_estimate(tracking *t, const mhe_estimate *estimate, mhe_e
         status = results_write(t->results, estimate, mhe_findings_distances(t->findings),
                                mhe_findings_emg(t->findings), err);
     }
+    peaks_add(&t->summary.peaks, estimate);
     return status == MHE_OK ? tally_add(&t->summary.tally, estimate, err) : status;
 }
 
@@ -379,6 +383,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     mhe_recording_close(t.recording);
     mhe_estimator_close(t.estimator);
     tally_free(&t.summary.tally);
+    peaks_free(&t.summary.peaks);
     live_close(&t.live);
     return status;
 }

@@ -84,6 +84,12 @@ static void take_controls(follow *f, const mhe_estimate *estimate) {
     for (int32_t i = 0; i < s->n_m; i++) {
         s->u[i] = fmin(fmax(u[i], 0), 1);
     }
+    const mhe_layout *layout = mhi_system_face(s->system)->layout;
+    const mhe_block *drive = mhe_layout_find(layout, MHE_ROLE_CONTROL, "actuator");
+    if (drive != NULL) { /* motors are part of the model; residual torques are not */
+        memcpy(s->u + drive->first, estimate->controls + drive->first,
+               sizeof(double) * (size_t)drive->count);
+    }
 }
 
 static mhe_status follow_path(follow *f, mhe_error *err) {

@@ -3,8 +3,6 @@
 
 #include "workers.h"
 
-#include <stdlib.h>
-
 #define FOLDERS_MAX 1000
 
 static const words_command commands[] = {
@@ -26,20 +24,6 @@ static const words_command commands[] = {
 #define AT(field) offsetof(arguments, field)
 #define RUN (1u << COMMAND_RUN)
 #define SUBMIT (1u << COMMAND_SUBMIT)
-
-/* "2/8" */
-static mhe_status take_shard(const char *word, const char *value, void *target, mhe_error *err) {
-    char *end = NULL;
-    const long shard = strtol(value, &end, 10);
-    const long n = end != value && *end == '/' ? strtol(end + 1, &end, 10) : 0;
-    if (*end != '\0' || shard < 0 || n < 1 || n > 100000 || shard >= n) {
-        return mhe_fail(err, MHE_E_ARGUMENT,
-                        "%s: '%s' is not like 0/8 ... 7/8, the first to the last of eight", word,
-                        value);
-    }
-    *(arguments_part *)target = (arguments_part){(int32_t)shard, (int32_t)n};
-    return MHE_OK;
-}
 
 static const words_option options[] = {
     {.name = "--out",
@@ -68,7 +52,7 @@ static const words_option options[] = {
      .commands = RUN,
      .kind = WORDS_OTHER,
      .at = AT(shard),
-     .take = take_shard},
+     .take = cluster_take_part},
     {.name = "--check",
      .help = "reads the study and all it names, and runs nothing",
      .commands = RUN,
@@ -88,7 +72,7 @@ static const words_option options[] = {
      .kind = WORDS_INT,
      .at = AT(n_tasks),
      .low = 1,
-     .high = 100000},
+     .high = CLUSTER_TASKS_MAX},
     {.name = "--option",
      .value = "WORD",
      .help = "goes to sbatch as it is: --option --partition=fast; may be given often",

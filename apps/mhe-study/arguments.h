@@ -3,15 +3,11 @@
 #ifndef ARGUMENTS_H
 #define ARGUMENTS_H
 
+#include "cluster.h"
 #include "words.h"
 
 /* Commands, in the order of the table. */
 enum { COMMAND_RUN, COMMAND_REPORT, COMMAND_SUBMIT, COMMAND_MERGE };
-
-/* --shard 2/8: the third of eight parts; 0/1 */
-typedef struct arguments_part {
-    int32_t i, n;
-} arguments_part;
 
 typedef struct arguments {
     int32_t mode;      /* 0 */
@@ -19,8 +15,8 @@ typedef struct arguments {
     words_list others; /* more folders */
     const char *out;   /* NULL: ./out/<study's name> */
     words_list set;
-    int32_t n_workers; /* 0: as many as there are processors */
-    arguments_part shard;
+    int32_t n_workers;  /* 0: as many as there are processors */
+    cluster_part shard; /* 0/1 unless given */
     const char *engine;
     int32_t n_tasks;
     words_list option; /* of the engine, lent as they stand */

@@ -83,9 +83,10 @@ static mhe_status work(session *s, const arguments *a, const char *own, mhe_erro
     if (status != MHE_OK) {
         return status;
     }
-    const int32_t wanted = a->n_workers > 0                          ? a->n_workers
-                           : s->study.keys.measure == MEASURE_TIMING ? 1
-                                                                     : workers_available();
+    const int32_t wanted = a->n_workers > 0 ? a->n_workers
+                           : s->study.keys.measure == MEASURE_TIMING
+                               ? 1
+                               : cluster_processors(WORKERS_MAX);
     const workers_setup setup = {.study = &s->study,
                                  .tasks = tasks,
                                  .n_tasks = n,

@@ -29,7 +29,4 @@ typedef struct workers_report {
  * a worker could not go on. */
 mhe_status workers_run(const workers_setup *setup, workers_report *report, mhe_error *err);
 
-/* Processors that this process may use. */
-int32_t workers_available(void);
-
 #endif

@@ -7,7 +7,7 @@
 #include "../weighted_terms.h"
 
 struct emg_markers { /* weights, and the muscles that have EMG */
-    double markers, emg, q, qdot, activation, residual_torque;
+    double markers, emg, q, qdot, activation, residual_torque, actuator;
     mhe_text_list tracked;
     double untracked;
 };
@@ -23,6 +23,8 @@ static const mhe_option emg_markers_options[] = {
                  "Weight on activations; excitation-driven only."),
     MHE_OPT_REAL(struct emg_markers, residual_torque, 1e8, 0, 1e15, "1/(N m)^2",
                  "Weight on residual torques, where the problem has them."),
+    MHE_OPT_REAL(struct emg_markers, actuator, 1e4, 0, 1e15, "1",
+                 "Weight on controls of the model's actuators, where bounds.actuators has them."),
     MHE_OPT_TEXTS(struct emg_markers, tracked, 0, "Muscles with EMG; empty: all."),
     MHE_OPT_REAL(struct emg_markers, untracked, 1e4, 0, 1e15, "1",
                  "Weight on all muscle controls towards 0 when some muscles have no EMG; else on "
@@ -56,6 +58,7 @@ static mhe_status emg_markers_create(const mhe_host *host, const mhe_problem *pr
         {.signal = "qdot", .weight = c->qdot},
         {.signal = "activation", .weight = by_excitation ? c->activation : 0},
         {.signal = "residual_torque", .weight = c->residual_torque, .optional = 1},
+        {.signal = "actuator", .weight = c->actuator, .optional = 1},
     };
     if (status == MHE_OK) {
         status = weighted_terms_create(problem, terms, sizeof terms / sizeof terms[0], self, err);

@@ -5,7 +5,7 @@
 #include "../weighted_terms.h"
 
 struct min_excitation { /* weights */
-    double markers, excitation, q, qdot, activation, residual_torque;
+    double markers, excitation, q, qdot, activation, residual_torque, actuator;
 };
 
 static const mhe_option min_excitation_options[] = {
@@ -20,6 +20,8 @@ static const mhe_option min_excitation_options[] = {
                  "Weight on activations; excitation-driven only."),
     MHE_OPT_REAL(struct min_excitation, residual_torque, 1e7, 0, 1e15, "1/(N m)^2",
                  "Weight on residual torques, where the problem has them."),
+    MHE_OPT_REAL(struct min_excitation, actuator, 1e4, 0, 1e15, "1",
+                 "Weight on controls of the model's actuators, where bounds.actuators has them."),
 };
 
 static mhe_status min_excitation_create(const mhe_host *host, const mhe_problem *problem,
@@ -34,6 +36,7 @@ static mhe_status min_excitation_create(const mhe_host *host, const mhe_problem 
         {.signal = "qdot", .weight = c->qdot},
         {.signal = "activation", .weight = by_excitation ? c->activation : 0},
         {.signal = "residual_torque", .weight = c->residual_torque, .optional = 1},
+        {.signal = "actuator", .weight = c->actuator, .optional = 1},
     };
     return weighted_terms_create(problem, terms, sizeof terms / sizeof terms[0], self, err);
 }

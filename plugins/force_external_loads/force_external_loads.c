@@ -17,6 +17,8 @@
 
 struct loads_config {
     const char *file;
+    mhe_real_list turn, shift;
+    double scale;
 };
 
 struct loads {
@@ -31,6 +33,12 @@ struct loads {
 static const mhe_option loads_options[] = {
     MHE_OPT_PATH(struct loads_config, file, MHE_OPT_REQUIRED,
                  "ExternalLoads .xml, with the .mot or .sto that it names."),
+    MHE_OPT_REALS(struct loads_config, turn, 0, -1, 1, "1",
+                  "From the file's ground to the model's: a rotation matrix row by row; none: they "
+                  "are the same. data.external_loads takes it from data.transform."),
+    MHE_OPT_REALS(struct loads_config, shift, 0, -1e6, 1e6, "m", "Added to points afterwards."),
+    MHE_OPT_REAL(struct loads_config, scale, 1, -1e6, 1e6, "1",
+                 "Factor of points before; below 0 all is mirrored."),
 };
 
 static void loads_destroy(void *self) {
@@ -57,7 +65,43 @@ static void loads_as_wrench(double *v) {
     v[3] = v[4] = v[5] = 0;
 }
 
-static mhe_status loads_prepare(struct loads *s) {
+/* Vector of ground, turned; mirrored where points are. A torque is none of the two that a mirror
+ * turns round: it keeps its sense. */
+static void loads_turn(const struct loads_config *c, double sign, double *v) {
+    const double from[3] = {v[0], v[1], v[2]};
+    for (int i = 0; i < 3; i++) {
+        const double *row = c->turn.n == 9 ? c->turn.values + 3 * (ptrdiff_t)i : NULL;
+        v[i] =
+            sign * (row == NULL ? from[i] : row[0] * from[0] + row[1] * from[1] + row[2] * from[2]);
+    }
+}
+
+/* Force, point and torque of the file's ground in the model's. */
+static void loads_to_model(const struct loads_config *c, const mhe_load *load, double *v) {
+    const double mirror = c->scale < 0 ? -1 : 1;
+    if (load->axes < 0) {
+        loads_turn(c, mirror, v);
+        loads_turn(c, 1, v + 6);
+    }
+    if (load->origin < 0) {
+        loads_turn(c, c->scale, v + 3);
+        for (int i = 0; i < 3 && c->shift.n == 3; i++) {
+            v[3 + i] += c->shift.values[i];
+        }
+    }
+}
+
+static mhe_status loads_check(const struct loads_config *c, mhe_error *err) {
+    if (c->turn.n != 0 && c->turn.n != 9) {
+        return mhe_fail(err, MHE_E_CONFIG, "turn: %d values; a matrix has 9", (int)c->turn.n);
+    }
+    if (c->shift.n != 0 && c->shift.n != 3) {
+        return mhe_fail(err, MHE_E_CONFIG, "shift: %d values; three are needed", (int)c->shift.n);
+    }
+    return c->scale == 0 ? mhe_fail(err, MHE_E_CONFIG, "scale: 0 leaves nothing") : MHE_OK;
+}
+
+static mhe_status loads_prepare(const struct loads_config *c, struct loads *s) {
     static const char *const parts[] = {"force", "point", "torque"};
     static const char *const units[] = {"N", "m", "N m"};
     const mhe_external_loads *f = s->file;
@@ -72,6 +116,9 @@ static mhe_status loads_prepare(struct loads *s) {
     }
     memcpy(s->values, f->values, rows * n * sizeof *s->values);
     for (int32_t l = 0; l < f->n_loads; l++) {
+        for (size_t k = 0; k < rows; k++) {
+            loads_to_model(c, &f->loads[l], s->values + k * n + PER_LOAD * (size_t)l);
+        }
         for (size_t k = 0; k < rows && f->loads[l].axes == f->loads[l].origin; k++) {
             loads_as_wrench(s->values + k * n + PER_LOAD * (size_t)l);
         }
@@ -88,7 +135,10 @@ static mhe_status loads_prepare(struct loads *s) {
 
 static mhe_status loads_create(const mhe_host *host, const mhe_description *description,
                                const void *config, void **self, mhe_error *err) {
-    const char *path = ((const struct loads_config *)config)->file;
+    const struct loads_config *c = config;
+    if (loads_check(c, err) != MHE_OK) {
+        return MHE_E_CONFIG;
+    }
     struct loads *s = calloc(1, sizeof *s);
     if (s == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for the loads");
@@ -96,9 +146,9 @@ static mhe_status loads_create(const mhe_host *host, const mhe_description *desc
     s->service = host->service(host, MHE_EXTERNAL_LOADS_SERVICE);
     mhe_status status = s->service == NULL
                             ? mhe_fail(err, MHE_E_UNSUPPORTED, "this program reads no such files")
-                            : s->service->read(path, description, &s->file, err);
+                            : s->service->read(c->file, description, &s->file, err);
     if (status == MHE_OK) {
-        status = loads_prepare(s);
+        status = loads_prepare(c, s);
         if (status != MHE_OK) {
             (void)mhe_fail(err, status, "no memory for the loads");
         }

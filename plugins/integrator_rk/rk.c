@@ -135,7 +135,7 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                   {&slot, (size_t)rk_slot_size(rk)},
                   {&trace, (size_t)rk_trace_size(rk)},
                   {&c->weights, RK_WEIGHED * (RK_WEIGHED + 1) / 2 * s * RK_ACTIVATION_STAGES},
-                  {&c->row, n_m},
+                  {&c->direct, 2 * n_q * (n_m > n_q ? n_m : n_q)},
                   {&c->adjoint, 2 * n_q * s * n_q},
                   {&c->carry, 2 * n_q * 2 * n_q},
                   {&c->sens, (2 * n_q + n_z) * columns},

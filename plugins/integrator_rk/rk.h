@@ -139,7 +139,7 @@ struct rk_context {
     int32_t keeps;             /* this call may write to `kept` */
     double *adjoint;           /* [s n_q x 2 n_q] d(q+, v+)/d(right-hand sides), transposed */
     double *carry;             /* [2 n_q x 2 n_q] d(q+, v+)/d(q, v), transposed */
-    double *row;               /* [n_m] */
+    double *direct;            /* [2 n_q x n_m or n_q] */
     double *sens, *sens_next;  /* [2 n_q + n_z x columns]; the first alone where there is z */
     int32_t columns;           /* n_x + n_u + n_p */
 
@@ -212,6 +212,10 @@ void rk_states_recall(struct rk_context *c, double h);
 void rk_states_keep(const struct rk_context *c);
 void rk_states_chain(struct rk_context *c, double h);
 int rk_states_advance(struct rk_context *c);
+
+/* product.c: C [m x n] += A^T B with A [k x m], B [k x n]; row-major with rows of ld doubles. */
+void rk_product(int32_t m, int32_t n, int32_t k, const double *A, int32_t ld_a, const double *B,
+                int32_t ld_b, double *C, int32_t ld_c);
 
 /* lu.c: a [n x n] row-major becomes its LU factors (0: singular); x [n] = A^-1 x; x [n x m],
  * row-major, = A^-1 x, = A^-T x. */

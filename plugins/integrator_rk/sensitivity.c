@@ -10,14 +10,6 @@
 
 #include <string.h>
 
-/* to [n] += factor * from [n] */
-static inline void rk_add(double *restrict to, double factor, const double *restrict from,
-                          int32_t n) {
-    for (int32_t i = 0; i < n; i++) {
-        to[i] += factor * from[i];
-    }
-}
-
 /* The transpose of W: row j n_q + k holds what a change of the k-th right-hand side of stage j does
  * to (q+, v+). */
 static void rk_adjoint(struct rk_context *c, double h) {
@@ -44,41 +36,50 @@ static void rk_carry(struct rk_context *c, double h) {
         by_q[i * two + i] = by_v[i * two + n_q + i] = 1;
         by_v[i * two + i] = h;
     }
-    for (int32_t k = 0; k < s * n_q; k++) {
-        const double *w = c->adjoint + k * two;
-        double ch = h * t->c[k / n_q];
-        const double *f_q = c->at->f_q + k * n_q, *f_v = c->at->f_v + k * n_q;
-        for (int32_t m = 0; m < n_q; m++) {
-            rk_add(by_q + m * two, f_q[m], w, two);
-            rk_add(by_v + m * two, ch * f_q[m] + f_v[m], w, two);
+    for (int32_t j = 0; j < s; j++) {
+        const double *w = c->adjoint + j * n_q * two;
+        double ch = h * t->c[j];
+        double *part = c->direct;
+        memset(part, 0, sizeof(double) * (size_t)(n_q * two));
+        rk_product(n_q, two, n_q, c->at->f_q + j * n_q * n_q, n_q, w, two, part, two);
+        rk_product(n_q, two, n_q, c->at->f_v + j * n_q * n_q, n_q, w, two, by_v, two);
+        for (int32_t i = 0; i < n_q * two; i++) {
+            by_q[i] += part[i];
+            by_v[i] += ch * part[i];
         }
     }
 }
 
-/* Adds the direct effect of stage activations and residual torques on (q+, v+)_i to `next`, its row
- * of sens_next. */
-static void rk_direct(struct rk_context *c, int32_t i, double *next) {
+/* Adds the direct effect of stage activations, residual torques and parameters on (q+, v+) to
+ * sens_next. */
+static void rk_direct(struct rk_context *c) {
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_d = system->n_d;
-    double *by_a = next + 2 * n_q, *by_e = by_a + n_d, *by_r = by_e + n_m, *row = c->row;
-    double *by_p = by_r + n_r;
-    int32_t n_p = system->n_p;
+    int32_t n_p = system->n_p, two = 2 * n_q, columns = c->columns;
+    int32_t of_a = two, of_e = of_a + n_d, of_r = of_e + n_m, of_p = of_r + n_r;
     for (int32_t j = 0; j < c->rk->mechanics.stages; j++) {
         const double *stage_a_a = c->stage_a_a + j * n_m, *stage_a_e = c->stage_a_e + j * n_m;
-        memset(row, 0, sizeof(double) * (size_t)n_m);
-        for (int32_t k = j * n_q; k < (j + 1) * n_q; k++) {
-            double w = c->adjoint[k * 2 * n_q + i];
-            rk_add(row, w, c->at->f_a + k * n_m, n_m);
-            rk_add(by_r, w, c->at->f_r + k * n_r, n_r);
-            if (n_p > 0) {
-                rk_add(by_p, w, c->at->f_p + k * n_p, n_p);
+        const double *w = c->adjoint + j * n_q * two;
+        memset(c->direct, 0, sizeof(double) * (size_t)(two * n_m));
+        rk_product(two, n_m, n_q, w, two, c->at->f_a + j * n_q * n_m, n_m, c->direct, n_m);
+        for (int32_t i = 0; i < two; i++) {
+            const double *row = c->direct + i * n_m;
+            double *by_a = c->sens_next + i * columns + of_a;
+            double *by_e = c->sens_next + i * columns + of_e;
+            for (int32_t m = 0; m < n_d; m++) {
+                by_a[m] += row[m] * stage_a_a[m];
+            }
+            for (int32_t m = 0; m < n_m; m++) {
+                by_e[m] += row[m] * stage_a_e[m];
             }
         }
-        for (int32_t m = 0; m < n_d; m++) {
-            by_a[m] += row[m] * stage_a_a[m];
+        if (n_r > 0) {
+            rk_product(two, n_r, n_q, w, two, c->at->f_r + j * n_q * n_r, n_r, c->sens_next + of_r,
+                       columns);
         }
-        for (int32_t m = 0; m < n_m; m++) {
-            by_e[m] += row[m] * stage_a_e[m];
+        if (n_p > 0) {
+            rk_product(two, n_p, n_q, w, two, c->at->f_p + j * n_q * n_p, n_p, c->sens_next + of_p,
+                       columns);
         }
     }
 }
@@ -87,18 +88,16 @@ CLONES static void rk_chain_rows(struct rk_context *c, double h) {
     int32_t two = 2 * c->rk->system->n_q, columns = c->columns;
     rk_adjoint(c, h);
     rk_carry(c, h);
-    for (int32_t i = 0; i < two; i++) {
-        double *next = c->sens_next + i * columns;
-        memset(next, 0, sizeof(double) * (size_t)columns);
+    memset(c->sens_next, 0, sizeof(double) * (size_t)(two * columns));
+    for (int32_t i = 0; i < two && c->step == 0; i++) { /* sens is the identity */
         for (int32_t k = 0; k < two; k++) {
-            if (c->step == 0) { /* sens is the identity */
-                next[k] = c->carry[k * two + i];
-            } else {
-                rk_add(next, c->carry[k * two + i], c->sens + k * columns, columns);
-            }
+            c->sens_next[i * columns + k] = c->carry[k * two + i];
         }
-        rk_direct(c, i, next);
     }
+    if (c->step > 0) {
+        rk_product(two, columns, two, c->carry, two, c->sens, columns, c->sens_next, columns);
+    }
+    rk_direct(c);
     double *swap = c->sens;
     c->sens = c->sens_next;
     c->sens_next = swap;

@@ -4,9 +4,8 @@
  * As OpenSim has it: the obstacles are taken in the order listed; each is tried with every piece of
  * the path as it is so far, within its range of points; the first piece that crosses it wraps, or
  * else the one that gets least longer. With several obstacles this is repeated until it stays the
- * same. Strings in a row then are pulled tight together: the point where the path passes between
- * two of them is moved across the path until both pull along one line (Newton's method, with the
- * second derivatives of wrap.h). Nothing is remembered from call to call. */
+ * same. Strings in a row then are pulled tight together (tighten.c). Nothing is remembered from
+ * call to call. */
 #include "numbers.h"
 #include "route.h"
 #include "vector.h"
@@ -15,9 +14,6 @@
 #include <string.h>
 
 #define MAX_PASSES 8
-#define MAX_NEWTON 20
-#define TIGHT 1e-13  /* m: last step of Newton's method */
-#define LONGEST 0.02 /* m: longest step */
 
 static void link_place(const path_pose *pose, int32_t link, const double *at, double *out) {
     if (link < 0) {
@@ -65,40 +61,6 @@ static void place_obstacle(const route_wrap *wrap, const path_pose *pose, double
     }
 }
 
-/* out = r^T (at - p) */
-static void into_frame(const double *frame, const double *at, double *out) {
-    double d[3] = {at[0] - frame[9], at[1] - frame[10], at[2] - frame[11]};
-    for (int i = 0; i < 3; i++) {
-        out[i] = frame[i] * d[0] + frame[3 + i] * d[1] + frame[6 + i] * d[2];
-    }
-}
-
-/* The string of wrap w between two points of ground, in ground; `before`: as it was in a step
- * before of the same pose, or NULL. */
-static int string_between(const path_route *route, int32_t w, const double *p, const double *s,
-                          const wrap_string *before, const route_work *work, wrap_string *out) {
-    const double *frame = work->obstacles + 12 * w;
-    double ends[2][3];
-    wrap_string guess;
-    into_frame(frame, p, ends[0]);
-    into_frame(frame, s, ends[1]);
-    if (before != NULL) {
-        into_frame(frame, before->a, guess.a);
-        guess.arc = before->arc;
-    }
-    int state =
-        wrap_solve(&route->wraps[w].surface, ends[0], ends[1], before != NULL ? &guess : NULL, out);
-    if (state > 0) {
-        place3(frame, frame + 9, out->a, out->a);
-        place3(frame, frame + 9, out->b, out->b);
-        for (int k = 0; k < 2; k++) {
-            rotate3(frame, out->t[k], out->t[k]);
-            rotate3(frame, out->n[k], out->n[k]);
-        }
-    }
-    return state;
-}
-
 /* ---- which obstacle where ---- */
 
 static void stops_remove(route_work *work, int32_t w) {
@@ -143,53 +105,67 @@ static double distance3(const double *a, const double *b) {
     return sqrt(dot3(d, d));
 }
 
-/* Puts wrap w where it belongs in the course without it. */
-static void wrap_insert(const path_route *route, int32_t w, route_work *work) {
+/* One piece that wrap w may go over: what became of it in `string`. */
+static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, const course_stop *a,
+                        const course_stop *b, const route_work *work, wrap_string *string) {
+    const double *tried = work->tried + 6 * w;
+    const wrap_string *last = before > 0 ? &work->strings[w] : NULL;
+    if (last != NULL && memcmp(tried, a->at, sizeof a->at) == 0 &&
+        memcmp(tried + 3, b->at, sizeof b->at) == 0) {
+        *string = *last;
+        return before;
+    }
+    return string_between(route, w, a->at, b->at, last, work, string);
+}
+
+/* Puts wrap w where it belongs in the course without it. 1: there it was. */
+static int wrap_insert(const path_route *route, int32_t w, route_work *work) {
     const route_wrap *wrap = &route->wraps[w];
-    int32_t from, to, best = -1;
-    double least = INFINITY, *tried = work->tried + 6 * w, ends[6];
-    wrap_string string, chosen = work->strings[w], last = chosen;
-    int32_t before = work->state[w];
-    stops_remove(work, w);
+    int32_t from, to, best = -1, before = work->state[w], now = WRAP_NONE, which = 0;
+    double least = INFINITY;
+    wrap_string strings[2]; /* the one tried, the best one */
+    if (before > 0) {
+        stops_remove(work, w);
+    }
     work->state[w] = WRAP_NONE;
     if (stops_range(wrap, work, &from, &to) != 0) {
-        return;
+        return before <= 0;
     }
     for (int32_t i = from; i < to; i++) {
         const course_stop *a = &work->stops[i], *b = &work->stops[i + 1];
         if (a->wrap >= 0 && a->wrap == b->wrap) {
             continue;
         }
-        int32_t state;
-        if (before > 0 && memcmp(tried, a->at, sizeof a->at) == 0 &&
-            memcmp(tried + 3, b->at, sizeof b->at) == 0) {
-            state = before;
-            string = last;
-        } else {
-            state =
-                string_between(route, w, a->at, b->at, before > 0 ? &last : NULL, work, &string);
+        int32_t state = wrap_try(route, w, before, a, b, work, &strings[which]);
+        if (best < 0 && now != WRAP_INSIDE) {
+            now = state; /* of what does not wrap, the first that is inside is told */
         }
-        if (best < 0 && work->state[w] != WRAP_INSIDE) {
-            work->state[w] = state; /* of what does not wrap, the first that is inside is told */
-        }
-        double longer = state > 0 ? wrap_length(&string) - distance3(a->at, b->at) : INFINITY;
+        double longer =
+            state > 0 ? wrap_length(&strings[which]) - distance3(a->at, b->at) : INFINITY;
         if (state == WRAP_CROSSED || longer < least) {
             least = longer;
             best = i;
-            chosen = string;
-            work->state[w] = state;
-            memcpy(ends, a->at, sizeof a->at);
-            memcpy(ends + 3, b->at, sizeof b->at);
+            now = state;
+            which = 1 - which;
         }
         if (state == WRAP_CROSSED) {
             break;
         }
     }
-    if (best >= 0) {
-        work->strings[w] = chosen;
-        memcpy(tried, ends, sizeof ends);
-        stops_insert(work, best, w, wrap->link);
+    work->state[w] = now;
+    if (best < 0) {
+        return before <= 0;
     }
+    double *tried = work->tried + 6 * w;
+    int same = before == now && memcmp(tried, work->stops[best].at, 3 * sizeof *tried) == 0 &&
+               memcmp(tried + 3, work->stops[best + 1].at, 3 * sizeof *tried) == 0;
+    if (!same) {
+        work->strings[w] = strings[1 - which];
+        memcpy(tried, work->stops[best].at, 3 * sizeof *tried);
+        memcpy(tried + 3, work->stops[best + 1].at, 3 * sizeof *tried);
+    }
+    stops_insert(work, best, w, wrap->link);
+    return same;
 }
 
 /* A number that tells one order of stops from another. */
@@ -220,13 +196,17 @@ static int course_has_joints(const route_work *work) {
 
 static void wraps_insert(const path_route *route, route_work *work) {
     uint64_t last = 0;
+    int32_t calm = 0; /* wraps in turn that stayed where they were: all of them, and it is done */
     for (int32_t w = 0; w < route->n_wraps; w++) {
         work->order[w] = w;
         work->state[w] = WRAP_NONE;
     }
     for (int32_t pass = 0; pass < MAX_PASSES; pass++) {
         for (int32_t k = 0; k < route->n_wraps; k++) {
-            wrap_insert(route, work->order[k], work);
+            calm = wrap_insert(route, work->order[k], work) ? calm + 1 : 0;
+            if (pass > 0 && calm >= route->n_wraps) {
+                return;
+            }
         }
         uint64_t digest = stops_digest(work);
         if (route->n_wraps < 2 || (digest == last && (pass > 1 || !course_has_joints(work)))) {
@@ -236,117 +216,10 @@ static void wraps_insert(const path_route *route, route_work *work) {
         if (pass == 0 && work->state[0] == WRAP_NONE && work->state[1] == WRAP_INSIDE) {
             work->order[0] = 1; /* what the first is in the way of comes first */
             work->order[1] = 0;
+        } else if (calm >= route->n_wraps) {
+            return;
         }
     }
-}
-
-/* ---- strings in a row ---- */
-
-static void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
-    const course_stop *a = &work->stops[stop], *b = &work->stops[stop + 1];
-    double u[3], least[3] = {0, 0, 0}, norm = 0;
-    for (int i = 0; i < 3; i++) {
-        joint->at[i] = 0.5 * (a->at[i] + b->at[i]);
-        u[i] = b->at[i] - a->at[i];
-    }
-    norm = sqrt(dot3(u, u));
-    for (int i = 0; i < 3; i++) { /* (nearly no distance: along the string) */
-        u[i] = norm > 1e-9 ? u[i] / norm : work->strings[a->wrap].t[1][i];
-    }
-    int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2)
-                                     : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
-    least[k] = 1;
-    cross3(u, least, joint->across[0]);
-    norm = sqrt(dot3(joint->across[0], joint->across[0]));
-    for (int i = 0; i < 3; i++) {
-        joint->across[0][i] /= norm;
-    }
-    cross3(u, joint->across[0], joint->across[1]);
-    joint->link = a->link;
-}
-
-static double quadratic(const double *m, const double *a, const double *b) {
-    double mb[3];
-    rotate3(m, b, mb);
-    return dot3(a, mb);
-}
-
-/* Gradient and second derivatives of one string (or straight piece) by its ends. */
-void string_derivatives(const wrap_string *string, const double *p, const double *s, double *g,
-                        double *pp, double *ps, double *ss) {
-    if (string != NULL) {
-        for (int i = 0; i < 3; i++) {
-            g[i] = -string->t[0][i];
-            g[3 + i] = string->t[1][i];
-        }
-        wrap_curvature(string, pp, ps, ss);
-        return;
-    }
-    double u[3] = {s[0] - p[0], s[1] - p[1], s[2] - p[2]}, l = sqrt(dot3(u, u));
-    double inverse = l < 1e-9 ? 0 : 1 / l;
-    for (int i = 0; i < 3; i++) {
-        u[i] *= inverse;
-        g[i] = -u[i];
-        g[3 + i] = u[i];
-    }
-    memset(pp, 0, 9 * sizeof *pp);
-    for (int i = 0; i < 3; i++) {
-        pp[4 * i] = inverse;
-    }
-    add_outer3(pp, -inverse, u, u);
-    for (int i = 0; i < 9; i++) {
-        ss[i] = pp[i];
-        ps[i] = -pp[i];
-    }
-}
-
-/* Adds a string's share to Newton's equations [2 n x (2 n + 1)]; joints -1: an end that stays. */
-static void newton_add(const route_work *work, int32_t stride, const wrap_string *string,
-                       const double *const ends[2], const int32_t joints[2], double *equations) {
-    double g[6], second[3][9];
-    string_derivatives(string, ends[0], ends[1], g, second[0], second[1], second[2]);
-    for (int e = 0; e < 2; e++) {
-        if (joints[e] < 0) {
-            continue;
-        }
-        const course_joint *own = &work->joints[joints[e]];
-        for (int i = 0; i < 2; i++) {
-            double *row = equations + (2 * joints[e] + i) * stride;
-            row[stride - 1] -= dot3(own->across[i], g + 3 * e);
-            for (int j = 0; j < 2; j++) {
-                row[2 * joints[e] + j] +=
-                    quadratic(second[e ? 2 : 0], own->across[i], own->across[j]);
-                if (joints[1 - e] >= 0) {
-                    const double *other = work->joints[joints[1 - e]].across[j];
-                    row[2 * joints[1 - e] + j] += e ? quadratic(second[1], other, own->across[i])
-                                                    : quadratic(second[1], own->across[i], other);
-                }
-            }
-        }
-    }
-}
-
-/* Solves the n equations, each row with its right-hand side; 0: done. */
-static int newton_solve(double *m, int32_t n) {
-    int32_t stride = n + 1;
-    for (int32_t i = 0; i < n; i++) {
-        if (!(m[i * stride + i] > 0)) {
-            return -1;
-        }
-        for (int32_t k = i + 1; k < n; k++) {
-            double factor = m[k * stride + i] / m[i * stride + i];
-            for (int32_t j = i; j <= n; j++) {
-                m[k * stride + j] -= factor * m[i * stride + j];
-            }
-        }
-    }
-    for (int32_t i = n - 1; i >= 0; i--) {
-        for (int32_t k = i + 1; k < n; k++) {
-            m[i * stride + n] -= m[i * stride + k] * m[k * stride + n];
-        }
-        m[i * stride + n] /= m[i * stride + i];
-    }
-    return 0;
 }
 
 /* The course as pieces between points and joints. */
@@ -376,51 +249,6 @@ static void pieces_make(const path_route *route, route_work *work) {
         }
         work->pieces[work->n_pieces++] = piece;
         i++; /* to the string's first end; the loop goes on at its second */
-    }
-}
-
-void piece_ends(const route_work *work, const course_piece *piece, const double *ends[2]) {
-    for (int e = 0; e < 2; e++) {
-        ends[e] = piece->joint[e] >= 0 ? work->joints[piece->joint[e]].at
-                                       : work->places + 3 * piece->point[e];
-    }
-}
-
-/* Moves the joints until the strings are tight. */
-static void joints_tighten(const path_route *route, route_work *work) {
-    int32_t n = 2 * work->n_joints, stride = n + 1;
-    for (int32_t k = 0; k <= MAX_NEWTON; k++) {
-        memset(work->newton, 0, sizeof *work->newton * (size_t)(n * stride));
-        for (int32_t i = 0; i < work->n_pieces; i++) {
-            const course_piece *piece = &work->pieces[i];
-            if (piece->joint[0] < 0 && piece->joint[1] < 0) {
-                continue;
-            }
-            const double *ends[2];
-            int32_t w = piece->wrap;
-            piece_ends(work, piece, ends);
-            wrap_string last = work->strings[w];
-            work->state[w] =
-                string_between(route, w, ends[0], ends[1], work->state[w] > 0 ? &last : NULL, work,
-                               &work->strings[w]);
-            newton_add(work, stride, work->state[w] > 0 ? &work->strings[w] : NULL, ends,
-                       piece->joint, work->newton);
-        }
-        double step = 0;
-        if (k == MAX_NEWTON || newton_solve(work->newton, n) != 0) {
-            return;
-        }
-        for (int32_t j = 0; j < n; j++) {
-            step = fmax(step, fabs(work->newton[j * stride + n]));
-        }
-        if (step < TIGHT) {
-            return;
-        }
-        double share = step > LONGEST ? LONGEST / step : 1;
-        for (int32_t j = 0; j < n; j++) {
-            course_joint *joint = &work->joints[j / 2];
-            add3(joint->at, share * work->newton[j * stride + n], joint->across[j % 2]);
-        }
     }
 }
 

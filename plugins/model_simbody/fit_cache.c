@@ -15,6 +15,8 @@
 
 #define MAGIC 0x32746966656d6800u /* "mhefit2", backwards */
 #define MOST 4096                 /* of any count in a file */
+#define LENGTHS 2 /* to be raised with every change of lengths or fits: older files are not read \
+                   */
 
 /* ---- digest ---- */
 
@@ -95,6 +97,7 @@ static void mix_path(uint64_t *digest, const mhe_path *p) {
 
 uint64_t fits_digest(const mhe_description *d, double tolerance, double range) {
     uint64_t digest = 1469598103934665603u;
+    mix_count(&digest, LENGTHS);
     mix_doubles(&digest, &tolerance, 1);
     mix_doubles(&digest, &range, 1);
     mix_count(&digest, d->n_coordinates);

@@ -137,9 +137,21 @@ void course_find(const path_route *route, const path_pose *pose, const double *n
 /* Ends of a piece in ground. */
 void piece_ends(const route_work *work, const course_piece *piece, const double *ends[2]);
 
-/* Gradient [6] and second derivatives of a string (NULL: straight) by its ends, all in ground. */
-void string_derivatives(const wrap_string *string, const double *p, const double *s, double *g,
-                        double *pp, double *ps, double *ss);
+/* Length of a piece between its ends, with gradient [6] and second derivatives by them, all in
+ * ground; NULL: not wanted. */
+double piece_length(const path_route *route, const route_work *work, const course_piece *piece,
+                    const double *const ends[2], double *g, double *pp, double *ps, double *ss);
+
+/* The string of wrap w between two points of ground, in ground; `before`: as it was in a step
+ * before of the same pose, or NULL. WRAP_*. */
+int string_between(const path_route *route, int32_t w, const double *p, const double *s,
+                   const wrap_string *before, const route_work *work, wrap_string *out);
+
+/* A joint between the strings that end at this stop and begin at the next. */
+void joint_begin(const route_work *work, int32_t stop, course_joint *joint);
+
+/* Moves the joints until the strings are tight. */
+void joints_tighten(const path_route *route, route_work *work);
 
 /* Length of the course found, with gradient and hessian (NULL: not wanted; rows of *stride) by the
  * own coordinates. */

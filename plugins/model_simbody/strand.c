@@ -162,24 +162,20 @@ static double piece_add(const tree *t, const path_route *route, const path_pose 
                         double *gradient, double *hessian) {
     const double *ends[2];
     piece_ends(work, piece, ends);
-    const wrap_string *string =
-        piece->wrap >= 0 && work->state[piece->wrap] > 0 ? &work->strings[piece->wrap] : NULL;
-    double d[3] = {ends[1][0] - ends[0][0], ends[1][1] - ends[0][1], ends[1][2] - ends[0][2]};
-    double length = string != NULL ? wrap_length(string) : sqrt(dot3(d, d));
-    int32_t from =
-        string != NULL ? route->wraps[piece->wrap].link : end_link(route, work, piece, 0);
+    int wraps = piece->wrap >= 0 && work->state[piece->wrap] > 0;
+    int32_t from = wraps ? route->wraps[piece->wrap].link : end_link(route, work, piece, 0);
     int32_t n[2];
     double g[6], pp[9], ps[9], ss[9];
     if (gradient == NULL) {
-        return length;
+        return piece_length(route, work, piece, ends, NULL, NULL, NULL, NULL);
     }
+    double length = piece_length(route, work, piece, ends, g, pp, ps, ss);
     for (int e = 0; e < 2; e++) {
         n[e] = end_steps(t, route, pose, work, piece, e, from, ends[e], work->steps[e]);
     }
     if (n[0] + n[1] == 0) {
         return length;
     }
-    string_derivatives(string, ends[0], ends[1], g, pp, ps, ss);
     end_add(work->steps[0], n[0], g, pp, stride, gradient, hessian);
     end_add(work->steps[1], n[1], g + 3, ss, stride, gradient, hessian);
     if (hessian != NULL) {

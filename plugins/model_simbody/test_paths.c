@@ -173,6 +173,7 @@ static test_instance instance;
 static int setup(void **state) {
     (void)state;
     assert_int_equal(setenv("XDG_CACHE_HOME", MHE_TEST_BINARY_DIR "/paths-cache", 1), 0);
+    assert_int_equal(system("rm -rf '" MHE_TEST_BINARY_DIR "/paths-cache'"), 0);
     test_open(&instance, &leg, 0);
     return 0;
 }

@@ -51,6 +51,8 @@ static void hold(rti_solver *s) {
         const ptrdiff_t at = (ptrdiff_t)(shape->N + 1) * shape->ld_z + i;
         q->fixed[at] = (uint8_t)at_bound(s, at);
     }
+    qp_use(q, QP_RICCATI);
+    q->riccati.fixed = q->fixed;
     riccati_read_fixed(&q->riccati);
 }
 

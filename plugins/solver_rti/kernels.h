@@ -37,6 +37,10 @@ typedef struct kernels {
     /* U w = -y */
     void (*substitute_back)(int32_t n, const double *U, int32_t ld, const double *inverse,
                             const double *y, double *w);
+    /* B [n x m] = A^T, A [m x n]; nothing beside them is touched. */
+    void (*transpose)(int32_t m, int32_t n, const double *A, int32_t ld_a, double *B, int32_t ld_b);
+    /* Below the diagonal what stands above it, M [n x n]. */
+    void (*mirror)(int32_t n, double *M, int32_t ld);
     /* y [n] += alpha A^T x, A [m x n]; y has KERNEL_LD(n) doubles. */
     void (*add_transposed)(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
                            const double *x, double *y);

@@ -161,6 +161,56 @@ static void add(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
     }
 }
 
+/* A block of four rows and columns. */
+static inline void transpose_four(const double *A, int32_t ld_a, double *B, int32_t ld_b) {
+    typedef int64_t order __attribute__((vector_size(32)));
+    const vec4 a = AT(A), b = AT(A + ld_a), c = AT(A + 2 * ld_a), d = AT(A + 3 * ld_a);
+    const vec4 ab = __builtin_shuffle(a, b, (order){0, 4, 2, 6}),
+               ba = __builtin_shuffle(a, b, (order){1, 5, 3, 7}),
+               cd = __builtin_shuffle(c, d, (order){0, 4, 2, 6}),
+               dc = __builtin_shuffle(c, d, (order){1, 5, 3, 7});
+    PUT(B) = __builtin_shuffle(ab, cd, (order){0, 1, 4, 5});
+    PUT(B + ld_b) = __builtin_shuffle(ba, dc, (order){0, 1, 4, 5});
+    PUT(B + 2 * ld_b) = __builtin_shuffle(ab, cd, (order){2, 3, 6, 7});
+    PUT(B + 3 * ld_b) = __builtin_shuffle(ba, dc, (order){2, 3, 6, 7});
+}
+
+/* Rows [from, m) of A, columns [first, n). */
+static inline void transpose_rest(int32_t from, int32_t m, int32_t first, int32_t n,
+                                  const double *A, int32_t ld_a, double *B, int32_t ld_b) {
+    for (int32_t i = from; i < m; i++) {
+        for (int32_t j = first; j < n; j++) {
+            B[j * ld_b + i] = A[i * ld_a + j];
+        }
+    }
+}
+
+static void transpose(int32_t m, int32_t n, const double *A, int32_t ld_a, double *B,
+                      int32_t ld_b) {
+    const int32_t rows = m / 4 * 4, columns = n / 4 * 4;
+    for (int32_t i = 0; i < rows; i += 4) {
+        for (int32_t j = 0; j < columns; j += 4) {
+            transpose_four(A + i * ld_a + j, ld_a, B + j * ld_b + i, ld_b);
+        }
+    }
+    transpose_rest(0, rows, columns, n, A, ld_a, B, ld_b);
+    transpose_rest(rows, m, 0, n, A, ld_a, B, ld_b);
+}
+
+static void mirror(int32_t n, double *M, int32_t ld) {
+    for (int32_t i = 0; i < n; i += 4) {
+        const int32_t end = i + 4 < n ? i + 4 : n;
+        for (int32_t r = i; r < end; r++) {
+            for (int32_t j = r + 1; j < end; j++) {
+                M[j * ld + r] = M[r * ld + j];
+            }
+        }
+        if (end < n) {
+            transpose(end - i, n - end, M + i * ld + end, ld, M + end * ld + i, ld);
+        }
+    }
+}
+
 const kernels KERNELS_TABLE = {.name = KERNELS_NAME,
                                .product = product,
                                .add_columns = add_columns,
@@ -168,5 +218,7 @@ const kernels KERNELS_TABLE = {.name = KERNELS_NAME,
                                .factor = factor,
                                .substitute = substitute,
                                .substitute_back = substitute_back,
+                               .transpose = transpose,
+                               .mirror = mirror,
                                .add_transposed = add_transposed,
                                .add = add};

@@ -23,10 +23,45 @@ static double finiteness(const double *values, int32_t n) {
     return sum;
 }
 
+/* The same where nothing but the block of the dense states and diagonals can stand in H; its other
+ * entries are 0 for good. */
+static double pack_separable(const rti_solver *s, const rti_worker *of, int32_t has_u,
+                             qp_stage *stage) {
+    const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, ld = s->shape.ld_z;
+    const int32_t n = s->shape.n_dense;
+    const double scale = s->scale;
+    double sum = finiteness(of->grad_x, n_x) + (has_u ? finiteness(of->grad_u, n_u) : 0);
+    for (int32_t i = 0; i < n; i++) {
+        double *row = stage->H + (n_u + i) * ld + n_u;
+        for (int32_t j = 0; j < n; j++) {
+            row[j] = scale * of->xx[i * n_x + j];
+        }
+        sum += finiteness(of->xx + i * n_x, n);
+    }
+    for (int32_t i = n; i < n_x; i++) {
+        const double h = of->xx[i * (n_x + 1)];
+        stage->H[(n_u + i) * (ld + 1)] = scale * h;
+        sum += h - h;
+    }
+    for (int32_t i = 0; i < n_x; i++) {
+        stage->g[n_u + i] = scale * of->grad_x[i];
+    }
+    for (int32_t i = 0; i < n_u && has_u; i++) {
+        const double h = of->uu[i * (n_u + 1)];
+        stage->H[i * (ld + 1)] = scale * h;
+        stage->g[i] = scale * of->grad_u[i];
+        sum += h - h;
+    }
+    return sum;
+}
+
 static double pack_costs(const rti_solver *s, const rti_worker *of, int32_t has_u,
                          qp_stage *stage) {
     const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, ld = s->shape.ld_z;
     const double scale = s->scale;
+    if (s->shape.separable) {
+        return pack_separable(s, of, has_u, stage);
+    }
     for (int32_t i = 0; i < n_x; i++) {
         double *row = stage->H + (n_u + i) * ld + n_u;
         for (int32_t j = 0; j < n_x; j++) {
@@ -94,7 +129,11 @@ static double pack_dynamics(const rti_solver *s, const rti_worker *of, qp_stage 
         stage->by_state[i] = of->A[i * n_x + i];
         stage->by_control[i] = control >= 0 ? of->B[i * n_u + control] : 0;
     }
-    return finiteness(of->A, n_x * n_x) + finiteness(of->B, n_x * n_u);
+    const int32_t dense =
+        s->shape.n_dense; /* of the other rows the factors alone can be anything */
+    return finiteness(of->A, dense * n_x) + finiteness(of->B, dense * n_u) +
+           finiteness(stage->by_state + dense, n_x - dense) +
+           finiteness(stage->by_control + dense, n_x - dense);
 }
 
 static double pack_gap(const rti_solver *s, const rti_worker *of, const double *next, double *b) {
@@ -112,7 +151,8 @@ typedef struct task {
 } task;
 
 static mhe_stage_values values_wanted(const rti_worker *to, int32_t wanted, int32_t has_u,
-                                      int32_t has_p, double *cost) {
+                                      const qp_shape *shape, double *cost) {
+    const int32_t has_p = shape->n_p > 0, separable = shape->separable;
     mhe_stage_values out = {.size = sizeof out};
     if (has_p && (wanted & RTI_DERIVATIVES)) {
         const int32_t costs = wanted & RTI_COSTS, dynamics = wanted & RTI_DYNAMICS;
@@ -128,7 +168,7 @@ static mhe_stage_values values_wanted(const rti_worker *to, int32_t wanted, int3
             out.grad_x = to->grad_x;
             out.hess_xx = to->xx;
             out.grad_u = has_u ? to->grad_u : NULL;
-            out.hess_ux = has_u ? to->ux : NULL;
+            out.hess_ux = has_u && !separable ? to->ux : NULL;
             out.hess_uu = has_u ? to->uu : NULL;
         }
     }
@@ -148,8 +188,7 @@ static mhe_status evaluate_stage(const task *t, int32_t worker, int32_t k) {
     qp_stage *stage = &t->point->stages[k];
     const int32_t has_u = k < s->shape.N, derivatives = t->wanted & RTI_DERIVATIVES;
     const double *u = row_z(&s->shape, t->point->w, k), *x = u + s->shape.n_u;
-    const mhe_stage_values out =
-        values_wanted(of, t->wanted, has_u, s->shape.n_p > 0, &s->stage_cost[k]);
+    const mhe_stage_values out = values_wanted(of, t->wanted, has_u, &s->shape, &s->stage_cost[k]);
     mhe_status status =
         s->problem->evaluate(s->problem, worker, k, x, has_u ? u : NULL, &out, &of->error);
     if (status != MHE_OK) {

@@ -10,6 +10,7 @@
 #ifndef QP_H
 #define QP_H
 
+#include "kalman.h"
 #include "riccati.h"
 
 typedef struct qp_limits { /* largest residuals of a solved program */
@@ -48,7 +49,8 @@ typedef struct qp {
     double stationarity, feasibility, complementarity; /* residuals reached */
     double open; /* sum of t z: what of the cost is left to gain where the others are 0 */
 
-    uint8_t *fixed; /* [size_z] controls and first states with equal bounds: constants */
+    uint8_t *fixed;         /* [size_z] controls and first states with equal bounds: constants */
+    int32_t first_is_fixed; /* all of the first state */
     qp_side *sides;
     int32_t n_sides, n_inequalities; /* equalities (later states with equal bounds) come last */
     double regularisation, softness; /* now */
@@ -56,7 +58,16 @@ typedef struct qp {
     double *slope, *gap;             /* residuals of w [size_z] and of the dynamics [size_x] */
     double *diagonal, *rhs, *dw, *dlambda;        /* of a Newton system */
     double *rest_w, *rest_x, *fix_w, *fix_lambda; /* of its refinement */
+    int32_t recursion; /* whose numbers stand in the memory that both share: QP_RICCATI ... */
+    double *recursion_memory;
     riccati riccati;
+    kalman kalman;
+    double *side;     /* [size_z] active.c: -1, 1: held at the lower, the upper bound; 0: at none */
+    uint8_t *held;    /* [size_z] controls and fixed variables that are constants */
+    uint8_t *turned;  /* [n_x] simple states with bounds, or a control with bounds, that changed */
+    int32_t programs; /* solved since qp_place(), and those of them in which no set was found */
+    int32_t fallbacks;
+    int32_t skipped, to_skip; /* programs after one whose sets cycled: twice as many each time */
     struct qp_border *border; /* of the parameters (border.c); NULL where there are none */
 } qp;
 
@@ -78,6 +89,26 @@ int32_t border_factor(qp *q);
 void border_solve(const qp *q, double *p);
 /* riccati_solve() with p: g ends with its row, and so does w. */
 void border_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
+
+#define QP_RICCATI 1
+#define QP_KALMAN 2
+
+/* The recursion that the Newton systems from now on are solved by; what another one knew is lost.
+ */
+void qp_use(qp *q, int32_t recursion);
+/* Factorises H + diag(q->diagonal) with what is `held` [size_z]; solves with g, b (riccati.h). */
+int32_t qp_factor(qp *q, const uint8_t *held);
+void qp_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
+/* Where the first state is fixed and costs allow it: on covariances. */
+int32_t qp_best(const qp *q);
+
+/* active.c: the program by a primal-dual active set, from the bounds at which the multipliers
+ * z_lower and z_upper say w will stay: QP_SOLVED within the limits, QP_LATE, or QP_LIMIT: no set
+ * found, w, lambda and z as they came. */
+int32_t active_solve(qp *q, const qp_limits *limits);
+
+/* inside.c: by the interior point, which any program can end with. */
+int32_t inside_solve(qp *q, const qp_limits *limits, int32_t warm);
 
 size_t qp_size(const qp_shape *s); /* bytes, a multiple of 64 */
 void qp_place(qp *q, const qp_shape *s, void *memory);

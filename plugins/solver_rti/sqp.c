@@ -197,7 +197,7 @@ static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info)
 
 /* Full steps need a start near the solution: multipliers and a given first state. */
 static int32_t is_near(const rti_solver *s) {
-    return s->warm && s->qp.riccati.first_is_fixed;
+    return s->warm && s->qp.first_is_fixed;
 }
 
 /* Any other window is solved as by `robust`. */

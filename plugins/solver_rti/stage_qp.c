@@ -23,6 +23,33 @@ static int32_t is_simple(const mhe_stage_problem *p, int32_t i, int32_t *control
     return 1;
 }
 
+/* Are the costs of controls and of simple states squares of each of them alone? */
+static int32_t has_diagonal_costs(const mhe_stage_problem *p, int32_t n_dense) {
+    if (p->uu_pattern == NULL || p->xx_pattern == NULL || p->ux_pattern == NULL) {
+        return 0;
+    }
+    for (int32_t i = 0; i < p->n_u; i++) {
+        for (int32_t j = 0; j < p->n_u; j++) {
+            if (p->uu_pattern[i * p->n_u + j] && j != i) {
+                return 0;
+            }
+        }
+        for (int32_t j = 0; j < p->n_x; j++) {
+            if (p->ux_pattern[i * p->n_x + j]) {
+                return 0;
+            }
+        }
+    }
+    for (int32_t i = n_dense; i < p->n_x; i++) {
+        for (int32_t j = 0; j < p->n_x; j++) {
+            if (j != i && (p->xx_pattern[i * p->n_x + j] || p->xx_pattern[j * p->n_x + i])) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
 void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape *shape) {
     const int32_t n_x = problem->n_x, n_u = problem->n_u;
     *shape = (qp_shape){.N = problem->n_intervals,
@@ -44,6 +71,8 @@ void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape
     for (int32_t i = shape->n_dense + 1; i < n_x; i++) {
         shape->in_order &= control_of[i] == control_of[i - 1] + 1;
     }
+    shape->separable =
+        (shape->in_order || shape->n_dense == n_x) && has_diagonal_costs(problem, shape->n_dense);
 }
 
 /* D and d of a stage, to the next multiple of 8. */
@@ -144,14 +173,44 @@ static void slope_p(const qp_shape *s, const qp_stage *stages, const double *w,
     }
 }
 
+void qp_add_curvature(const qp_shape *s, const qp_stage *stage, double factor, const double *w,
+                      double *w_out) {
+    if (!s->separable) {
+        s->kernels->add_transposed(s->n_z, s->n_z, factor, stage->H, s->ld_z, w, w_out);
+        return;
+    }
+    const int32_t first = s->n_u, end = s->n_u + s->n_dense;
+    for (int32_t i = 0; i < first; i++) {
+        w_out[i] += factor * stage->H[(ptrdiff_t)i * (s->ld_z + 1)] * w[i];
+    }
+    for (int32_t i = end; i < s->n_z; i++) {
+        w_out[i] += factor * stage->H[(ptrdiff_t)i * (s->ld_z + 1)] * w[i];
+    }
+    s->kernels->add_transposed(s->n_dense, s->n_dense, factor, stage->H + first * s->ld_z + first,
+                               s->ld_z, w + first, w_out + first);
+}
+
+void qp_gaps(const qp_shape *s, const qp_stage *stages, const double *w, double *gap) {
+    for (int32_t k = 0; k < s->N; k++) {
+        const double *next = w + (ptrdiff_t)(k + 1) * s->ld_z + s->n_u;
+        double *out = row_x(s, gap, k);
+        for (int32_t i = 0; i < s->n_x; i++) {
+            out[i] = stages[k].b[i] - next[i];
+        }
+        qp_forward(s, &stages[k], w + (ptrdiff_t)k * s->ld_z, out);
+        if (s->n_p > 0) {
+            qp_forward_p(s, &stages[k], w + (ptrdiff_t)(s->N + 1) * s->ld_z, out);
+        }
+    }
+}
+
 void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out) {
     for (int32_t k = 0; k <= s->N; k++) {
         double *slope = out + (ptrdiff_t)k * s->ld_z;
         memcpy(slope, stages[k].g, sizeof(double) * (size_t)s->ld_z);
         if (w != NULL) {
-            s->kernels->add_transposed(s->n_z, s->n_z, 1, stages[k].H, s->ld_z,
-                                       w + (ptrdiff_t)k * s->ld_z, slope);
+            qp_add_curvature(s, &stages[k], 1, w + (ptrdiff_t)k * s->ld_z, slope);
         }
         for (int32_t i = 0; k > 0 && i < s->n_x; i++) {
             slope[s->n_u + i] += lambda[(ptrdiff_t)(k - 1) * s->ld_x + i];

@@ -25,6 +25,9 @@ typedef struct qp_shape {
     int32_t n_dense;
     const int32_t *control_of; /* [n_x]; -1: none */
     int32_t in_order; /* each of them depends on the control behind that of the state before it */
+    /* Costs hold no products of a control or one of those states with anything else, and each of
+     * those states has a control that no other one has: kalman.h. */
+    int32_t separable;
     const kernels *kernels;
 } qp_shape;
 
@@ -79,5 +82,10 @@ void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const 
  * stages. `w` NULL: 0. */
 void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out);
+/* gap [size_x] = F_k w_k + P_k p + b_k - x_{k+1} */
+void qp_gaps(const qp_shape *s, const qp_stage *stages, const double *w, double *gap);
+/* w_out [n_z] += factor H w, of a stage. */
+void qp_add_curvature(const qp_shape *s, const qp_stage *stage, double factor, const double *w,
+                      double *w_out);
 
 #endif

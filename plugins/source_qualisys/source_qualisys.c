@@ -1,174 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* source_qualisys.c: markers and analog channels of Qualisys Track Manager, on its one clock. */
-#include "rt.h"
+#include "qualisys.h"
 
-#include <mhe/source.h>
-
-#include <errno.h>
 #include <math.h>
-#include <netdb.h>
-#include <poll.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 #include <time.h>
-#include <unistd.h>
-
-#define ROOM (1u << 20)    /* bytes that are read at once, and grow to a whole packet */
-#define NUMBERS (1u << 18) /* of one component */
-#define AGAIN 0.5          /* s between two tries to connect anew */
-#define ANSWER 2.0         /* s that an answer may take */
-
-struct qualisys_config { /* filled by the core from the option table */
-    const char *host;
-    int32_t port;
-    const char *device; /* analog device; "": the first */
-    int32_t emg;
-};
-
-/* Stream 0: markers; stream 1: the analog device, where there is one. */
-typedef struct qualisys {
-    const mhe_host *host;
-    struct qualisys_config config;
-    int socket; /* -1: none */
-    uint8_t *bytes;
-    size_t n_bytes, room;
-    double *numbers, *stamps;
-    rt_parameters parameters;
-    int32_t device;         /* number among the parameters' devices; -1: none */
-    char **labels, **units; /* of the markers' axes [3 n_markers] */
-    const mhe_source_taker *taker;
-    double received;
-    double tried; /* s, when a connection was tried last */
-    int32_t lost, ended;
-    uint32_t next_sample; /* number that the next analog sample should have */
-} qualisys;
-
-static double now(void) {
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
-/* ---- the connection ---- */
-
-static void disconnect(qualisys *s) {
-    if (s->socket >= 0) {
-        (void)close(s->socket);
-    }
-    s->socket = -1;
-    s->n_bytes = 0;
-}
-
-static int wait_for(int fd, short what, double deadline) {
-    const double seconds = deadline - now();
-    struct pollfd p = {.fd = fd, .events = what};
-    return poll(&p, 1, seconds <= 0 ? 0 : (int)ceil(1000 * fmin(seconds, 60))) > 0;
-}
-
-static mhe_status connect_socket(qualisys *s, double deadline, mhe_error *err) {
-    char port[16];
-    struct addrinfo *list = NULL;
-    const struct addrinfo hints = {.ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM};
-    (void)snprintf(port, sizeof port, "%d", (int)s->config.port);
-    if (getaddrinfo(s->config.host, port, &hints, &list) != 0) {
-        return mhe_fail(err, MHE_RETRY, "the host '%s' is not known", s->config.host);
-    }
-    for (const struct addrinfo *a = list; a != NULL && s->socket < 0; a = a->ai_next) {
-        s->socket = socket(a->ai_family, a->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-        if (s->socket < 0) {
-            continue;
-        }
-        int code = 0;
-        socklen_t size = sizeof code;
-        if (connect(s->socket, a->ai_addr, a->ai_addrlen) != 0 &&
-            (errno != EINPROGRESS || !wait_for(s->socket, POLLOUT, deadline) ||
-             getsockopt(s->socket, SOL_SOCKET, SO_ERROR, &code, &size) != 0 || code != 0)) {
-            disconnect(s);
-        }
-    }
-    freeaddrinfo(list);
-    return s->socket >= 0 ? MHE_OK
-                          : mhe_fail(err, MHE_RETRY, "no QTM at %s, port %d", s->config.host,
-                                     (int)s->config.port);
-}
-
-static mhe_status send_command(qualisys *s, const char *text, mhe_error *err) {
-    uint8_t packet[256];
-    const size_t size = rt_write_command(text, packet, sizeof packet);
-    size_t done = 0;
-    while (done < size) {
-        const ssize_t n = send(s->socket, packet + done, size - done, MSG_NOSIGNAL);
-        if (n < 0 && (errno != EAGAIN || !wait_for(s->socket, POLLOUT, now() + ANSWER))) {
-            return mhe_fail(err, MHE_RETRY, "QTM takes no commands");
-        }
-        done += n > 0 ? (size_t)n : 0;
-    }
-    return MHE_OK;
-}
-
-/* Reads what is there into the buffer, waiting until the deadline. MHE_RETRY: the connection is
- * closed. */
-static mhe_status receive(qualisys *s, double deadline, mhe_error *err) {
-    if (s->n_bytes == s->room) {
-        uint8_t *grown = s->room >= RT_LARGEST ? NULL : realloc(s->bytes, 2 * s->room);
-        if (grown == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-        s->bytes = grown;
-        s->room *= 2;
-    }
-    if (!wait_for(s->socket, POLLIN, deadline)) {
-        return MHE_OK;
-    }
-    const ssize_t n = recv(s->socket, s->bytes + s->n_bytes, s->room - s->n_bytes, 0);
-    if (n == 0 || (n < 0 && errno != EAGAIN && errno != EINTR)) {
-        return mhe_fail(err, MHE_RETRY, "QTM has closed the connection");
-    }
-    s->n_bytes += n > 0 ? (size_t)n : 0;
-    s->received = now();
-    return MHE_OK;
-}
-
-static void drop(qualisys *s, size_t used) {
-    memmove(s->bytes, s->bytes + used, s->n_bytes - used);
-    s->n_bytes -= used;
-}
-
-/* Waits for a packet of a type; others are passed over. Its body is valid until drop(*used). */
-static mhe_status await(qualisys *s, uint32_t type, double deadline, rt_packet *packet,
-                        size_t *used, mhe_error *err) {
-    for (;;) {
-        mhe_status status = rt_take_packet(s->bytes, s->n_bytes, packet, used, err);
-        if (status == MHE_OK && packet->type == type) {
-            return MHE_OK;
-        }
-        if (status == MHE_OK && packet->type == RT_ERROR) {
-            return mhe_fail(err, MHE_RETRY, "QTM says: %.*s", (int)packet->length,
-                            (const char *)packet->body);
-        }
-        if (status == MHE_OK) {
-            drop(s, *used);
-            continue;
-        }
-        if (status < 0) {
-            return status;
-        }
-        if (now() >= deadline) {
-            return mhe_fail(err, MHE_RETRY, "QTM does not answer");
-        }
-        status = receive(s, deadline, err);
-        if (status != MHE_OK) {
-            return status;
-        }
-    }
-}
-
-static mhe_status ask(qualisys *s, const char *command, uint32_t type, rt_packet *packet,
-                      size_t *used, mhe_error *err) {
-    const mhe_status status = send_command(s, command, err);
-    return status == MHE_OK ? await(s, type, now() + ANSWER, packet, used, err) : status;
-}
 
 /* ---- what is streamed ---- */
 
@@ -218,13 +55,14 @@ static mhe_status read_parameters(qualisys *s, mhe_error *err) {
     rt_packet packet;
     size_t used = 0;
     rt_parameters fresh;
-    mhe_status status = ask(s, s->config.emg ? "GetParameters 3D Analog" : "GetParameters 3D",
-                            RT_XML, &packet, &used, err);
+    mhe_status status =
+        qualisys_ask(s, s->config.emg ? "GetParameters 3D Analog" : "GetParameters 3D", RT_XML,
+                     &packet, &used, err);
     if (status != MHE_OK) {
         return status;
     }
     status = rt_parse_parameters((const char *)packet.body, packet.length, &fresh, err);
-    drop(s, used);
+    qualisys_drop(s, used);
     if (status != MHE_OK) {
         return status;
     }
@@ -239,25 +77,26 @@ static mhe_status read_parameters(qualisys *s, mhe_error *err) {
 static mhe_status begin(qualisys *s, double deadline, mhe_error *err) {
     rt_packet packet;
     size_t used = 0;
-    mhe_status status = connect_socket(s, deadline, err);
+    mhe_status status = qualisys_connect(s, deadline, err);
     if (status == MHE_OK) {
-        status = await(s, RT_COMMAND, now() + ANSWER, &packet, &used, err); /* its welcome */
+        status = qualisys_await(s, RT_COMMAND, qualisys_now() + ANSWER, &packet, &used,
+                                err); /* its welcome */
     }
     if (status == MHE_OK) {
-        drop(s, used);
-        status = ask(s, "Version 1.22", RT_COMMAND, &packet, &used, err);
+        qualisys_drop(s, used);
+        status = qualisys_ask(s, "Version 1.22", RT_COMMAND, &packet, &used, err);
     }
     if (status == MHE_OK) {
-        drop(s, used);
+        qualisys_drop(s, used);
         status = read_parameters(s, err);
     }
     if (status == MHE_OK) {
-        status = send_command(
+        status = qualisys_send(
             s, s->config.emg ? "StreamFrames AllFrames 3D Analog" : "StreamFrames AllFrames 3D",
             err);
     }
     if (status != MHE_OK) {
-        disconnect(s);
+        qualisys_disconnect(s);
     }
     return status;
 }
@@ -267,9 +106,9 @@ static mhe_status begin(qualisys *s, double deadline, mhe_error *err) {
 static void qualisys_destroy(void *self) {
     qualisys *s = self;
     if (s->socket >= 0) {
-        (void)send_command(s, "StreamFrames Stop", NULL);
+        (void)qualisys_send(s, "StreamFrames Stop", NULL);
     }
-    disconnect(s);
+    qualisys_disconnect(s);
     free_axes(s, s->parameters.n_markers);
     rt_free_parameters(&s->parameters);
     free(s->bytes);
@@ -336,7 +175,8 @@ static void tell(const qualisys *s, int32_t event, int32_t stream, const char *t
 static void take_markers(void *data, double time, int32_t n, const double *position) {
     qualisys *s = data;
     if (n != s->parameters.n_markers) {
-        return; /* an event says so first; what was on the way belongs to nothing */
+        s->differs = 1; /* often an event says so first */
+        return;
     }
     const mhe_chunk chunk = {.size = sizeof chunk,
                              .stream = 0,
@@ -353,7 +193,11 @@ static void take_analog(void *data, double time, int32_t device, int32_t n_chann
                         uint32_t first, const double *values) {
     qualisys *s = data;
     const rt_analog_device *d = s->device < 0 ? NULL : &s->parameters.devices[s->device];
-    if (d == NULL || d->id != device || d->n_channels != n_channels || (uint32_t)n > NUMBERS) {
+    if (d == NULL || d->id != device || (uint32_t)n > NUMBERS) {
+        return;
+    }
+    if (d->n_channels != n_channels) {
+        s->differs = 1;
         return;
     }
     if (s->next_sample != 0 && first > s->next_sample) {
@@ -395,11 +239,13 @@ static mhe_status take_packet(qualisys *s, const rt_packet *packet, size_t used,
             tell(s, MHE_SOURCE_WARNING, -1, why.text);
         }
     }
-    drop(s, used);
+    qualisys_drop(s, used);
     if (type == RT_NO_MORE_DATA) {
         tell(s, MHE_SOURCE_LOST, -1, "QTM has no more data: the measurement has ended");
         s->lost = 1;
-    } else if (event == RT_EVENT_CHANGED) {
+    } else if (event == RT_EVENT_CHANGED || (s->differs && qualisys_now() - s->asked > ASK_EVERY)) {
+        s->asked = qualisys_now();
+        s->differs = 0;
         status = settings_changed(s, err);
     } else if (event == RT_EVENT_CLOSED) {
         status = mhe_fail(err, MHE_RETRY, "QTM is shutting down");
@@ -427,16 +273,16 @@ static mhe_status take_all(qualisys *s, mhe_error *err) {
 
 /* The connection is gone: told once, tried again now and then. */
 static void reconnect(qualisys *s, double deadline) {
-    if (now() - s->tried < AGAIN) {
+    if (qualisys_now() - s->tried < AGAIN) {
         const double until = fmin(deadline, s->tried + AGAIN);
-        const double seconds = fmax(0, until - now());
+        const double seconds = fmax(0, until - qualisys_now());
         const struct timespec pause = {(time_t)seconds, (long)(1e9 * fmod(seconds, 1))};
         (void)nanosleep(&pause, NULL);
         return;
     }
-    s->tried = now();
+    s->tried = qualisys_now();
     s->next_sample = 0;
-    if (begin(s, now() + AGAIN, NULL) == MHE_OK) {
+    if (begin(s, qualisys_now() + AGAIN, NULL) == MHE_OK) {
         s->lost = 0;
         tell(s, MHE_SOURCE_CHANGED, -1, "QTM is back");
     }
@@ -451,7 +297,7 @@ static mhe_status qualisys_read(void *self, double deadline, const mhe_source_ta
         return MHE_OK;
     }
     mhe_error why = {0};
-    mhe_status status = receive(s, deadline, &why);
+    mhe_status status = qualisys_receive(s, deadline, &why);
     if (status == MHE_OK) {
         status = take_all(s, &why);
     }
@@ -459,7 +305,7 @@ static mhe_status qualisys_read(void *self, double deadline, const mhe_source_ta
         return mhe_fail(err, status, "%s", why.text);
     }
     if (status != MHE_OK) { /* closed, or bytes that are none of the protocol */
-        disconnect(s);
+        qualisys_disconnect(s);
         s->lost = 1;
         tell(s, MHE_SOURCE_LOST, -1, why.text);
     }

@@ -14,6 +14,7 @@
 Units are SI and radians. Missing values are NaN. Errors are exceptions (myohorizon.Error) that hold the file and line they
 name. Messages of the library go to the logger "myohorizon". The keys of a config: myohorizon.describe("config").
 """
+from .batch import batch
 from .catalogue import describe, plugins, version
 from .costs import Cost
 from .errors import (ArgumentError, ClosedError, ConfigError, Error, InputError, Interrupted, NumericError, OutputError,
@@ -28,5 +29,5 @@ __version__ = version()
 
 __all__ = ["ArgumentError", "ClosedError", "ConfigError", "Cost", "Error", "Estimate", "Estimator", "Finding", "InputError",
            "Interrupted", "Live", "Model", "Motion", "NumericError", "OutputError", "PluginError", "Results", "Table",
-           "ThreadError", "UnsupportedError", "check_config", "describe", "plugins", "read_c3d", "read_sto", "read_trc",
+           "ThreadError", "UnsupportedError", "batch", "check_config", "describe", "plugins", "read_c3d", "read_sto", "read_trc",
            "read_xdf", "run", "version"]

@@ -380,7 +380,7 @@ AT(mhe_cost_layout, scratch_bytes, 148);
 AT(mhe_cost_layout, res_unit, 152);
 AT(mhe_cost_layout, fills_missing, 160);
 
-SIZE(mhe_stage, 48);
+SIZE(mhe_stage, 56);
 AT(mhe_stage, size, 0);
 AT(mhe_stage, node, 4);
 AT(mhe_stage, n_intervals, 8);
@@ -389,6 +389,7 @@ AT(mhe_stage, time, 16);
 AT(mhe_stage, y, 24);
 AT(mhe_stage, y_ref, 32);
 AT(mhe_stage, scratch, 40);
+AT(mhe_stage, y_spread, 48);
 
 SIZE(mhe_cost_ops, 48);
 AT(mhe_cost_ops, size, 0);

@@ -29,6 +29,24 @@ static double value_at(int32_t row, int32_t what) {
     return sin(0.37 * row + 1.1 * what);
 }
 
+/* Of one muscle's tendon, behind q, qdot and the activations. */
+static const mhe_block blocks[] = {
+    {.name = "q", .role = MHE_ROLE_STATE, .count = 2, .entry_names = coordinates},
+    {.name = "qdot", .role = MHE_ROLE_STATE, .first = 2, .count = 2, .entry_names = coordinates},
+    {.name = "activation", .role = MHE_ROLE_STATE, .first = 4, .count = 3, .entry_names = muscles},
+    {.name = "fiber_length",
+     .role = MHE_ROLE_STATE,
+     .first = 7,
+     .count = 1,
+     .entry_names = &muscles[2]},
+    {.name = "excitation", .role = MHE_ROLE_CONTROL, .count = 3, .entry_names = muscles}};
+static const mhe_layout layout = {.size = sizeof layout,
+                                  .block_size = sizeof blocks[0],
+                                  .n_blocks = sizeof blocks / sizeof blocks[0],
+                                  .blocks = blocks,
+                                  .n_x = 8,
+                                  .n_u = 3};
+
 static void write_all(const char *formats) {
     const mhe_estimator_info info = {.n_q = 2,
                                      .n_muscles = 3,
@@ -37,7 +55,8 @@ static void write_all(const char *formats) {
                                      .ratio = 1,
                                      .coordinate_names = coordinates,
                                      .muscle_names = muscles,
-                                     .marker_names = markers};
+                                     .marker_names = markers,
+                                     .layout = &layout};
     const mhe_recording_info recording = {
         .rate = 100, .marker_unit = 1e-3, .marker_unit_name = "mm"};
     mhe_outbox *outbox = NULL;
@@ -63,7 +82,9 @@ static void write_all(const char *formats) {
                                 .force = v + 10,
                                 .moment = v + 13,
                                 .residual = v + 15,
-                                .markers = v + 16};
+                                .markers = v + 16,
+                                .layout = &layout,
+                                .states = v + 3}; /* the fibre length is v[10] */
         assert_int_equal(results_write(r, &e, v + 16, v + 4, &err), MHE_OK);
     }
     assert_int_equal(mhe_outbox_commit(outbox, &err), MHE_OK);
@@ -97,7 +118,7 @@ static void tables_say_the_same(void **state) {
         const char *sto, *csv;
         int32_t n, first;
         const char *label;
-    } files[] = {{"estimates.sto", "estimates.csv", 10, 0, "q_elbow"},
+    } files[] = {{"estimates.sto", "estimates.csv", 11, 0, "q_elbow"},
                  {"forces.sto", "forces.csv", 3, 10, "BRA"},
                  {"torques.sto", "torques.csv", 3, 13, "moment_elbow"},
                  {NULL, "markers.csv", 3, 16, "DELT_x"}};
@@ -119,6 +140,9 @@ static void tables_say_the_same(void **state) {
         check_values(t, files[i].first);
         mhi_table_free(t);
     }
+    mhi_table *states = read_table("estimates.sto");
+    assert_string_equal(states->labels[10], "fiber_length_TRI");
+    mhi_table_free(states);
     char line[128] = "";
     FILE *csv = fopen(path_of("torques.csv"), "r");
     assert_non_null(csv);
@@ -180,7 +204,7 @@ static void matlab_file_holds_all(void **state) {
     (void)state;
     mat_t *mat = Mat_Open(path_of("results.mat"), MAT_ACC_RDONLY);
     assert_non_null(mat);
-    check_mat(mat, "estimates", 10, 0, "e_TRI");
+    check_mat(mat, "estimates", 11, 0, "fiber_length_TRI");
     check_mat(mat, "forces", 3, 10, "TRI");
     check_mat(mat, "torques", 3, 13, "residual_elbow");
     check_mat(mat, "markers", 3, 16, "DELT_z");

@@ -86,7 +86,7 @@ mhe_status rig_read(emg_rig *rig, mhi_table *table, int32_t n_frames, double *em
         time[k] = k / 100.0;
     }
     const mhe_status status =
-        mhi_electrodes_read(&rig->run, &rig->model, table, time, n_frames, emg, &rig->n_found,
+        mhi_electrodes_read(&rig->run, &rig->model, table, time, n_frames, 0.01, emg, &rig->n_found,
                             &rig->report, &rig->host, &rig->err);
     free(time);
     return status;

@@ -191,7 +191,9 @@ static void recovers(const char *name, const char *solver, int ratio, fault harm
     assert_true(count(o, from, to, -1) <= (to - from) * (ratio - 1) / ratio + 1);
     assert_true(count(o, from, to, MHE_FRAME_PREDICTED) == 0);
     assert_true(a <= 1.05 * a0);
-    assert_true(f <= 1.05 * f0);
+    /* Or within 0.05 N, a ten thousandth of a muscle's force: the undisturbed run, to 0.01 N, is
+     * nearer to the truth than what one iteration a window leaves of a fault. */
+    assert_true(f <= fmax(1.05 * f0, 0.05));
     rig_close(&r);
 }
 

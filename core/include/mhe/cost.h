@@ -16,6 +16,7 @@
  *   muscle_force     [n_muscles]    N, along the tendon
  *   joint_moment     [n_q]          N m (N), by the muscles: -L_q^T F
  *   residual_torque  [n_q]          N m (N); only where switched on
+ *   actuator         [n_actuators]  1, in parts of the optimal force; only where switched on
  *   loop_gap, loop_rate  three or six a loop of the model; m, m/s (of welds also 1, rad/s). Where
  *                    there are any the problem has terms of its own that bring them to 0
  *
@@ -104,6 +105,8 @@ typedef struct mhe_stage {
     const double *y_ref; /* [ny], NaN where no target is known; of MHE_AT_PREVIOUS: the target that
                           * the node before had */
     void *scratch;       /* [scratch_bytes], 64-byte aligned, this thread's own */
+    const double *y_spread; /* [ny] standard deviation of an entry's targets since the start, of
+                             * EMG; NaN: not known. May be NULL */
 } mhe_stage;
 
 /* Is an entry the one of that name, or one of its axes ("STER.x" of "STER")? [any] */

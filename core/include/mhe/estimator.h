@@ -66,6 +66,7 @@ typedef struct mhe_estimator mhe_estimator;
 #define MHE_GAP_HOLD 0    /* the newest sample at or before the node */
 #define MHE_GAP_LINEAR 1  /* linear between the samples beside it */
 #define MHE_GAP_NEAREST 2 /* the sample nearest to it */
+#define MHE_GAP_MEAN 3    /* mean of the samples from the node on, before the next; else HOLD */
 
 /* One row of the table. Strings and arrays live as long as the estimator. */
 typedef struct mhe_channel {
@@ -78,7 +79,7 @@ typedef struct mhe_channel {
     const char *const *labels;  /* [n_labels] of markers, muscles, coordinates */
     const char *const *columns; /* [width], "WRIST.x" where there are several a label */
     const char *const *units;   /* [width] */
-    int32_t gap_rule;           /* MHE_GAP_* */
+    int32_t gap_rule;           /* MHE_GAP_*; MEAN: frames between two nodes count, too */
     double gap;                 /* s; 0 before the interval is known */
     double delay;               /* s by which a node's value is older than the node: data.emg_delay
                                  * frames; 0 before the interval is known */
@@ -143,10 +144,13 @@ typedef struct mhe_estimator_info {
     int32_t node; /* of the estimates: 0 the window's oldest frame, `window` the newest */
     double delay; /* s from that node to the newest frame: (window - node) * interval */
     int32_t n_channels;
-    uint32_t channel_size;       /* stride of `channels` */
-    const mhe_channel *channels; /* delay and gap follow the interval */
-    int32_t phase;               /* MHE_PHASE_*, at the moment */
-    const mhe_layout *layout;    /* of states, controls, inputs, parameters */
+    uint32_t channel_size;          /* stride of `channels` */
+    const mhe_channel *channels;    /* delay and gap follow the interval */
+    int32_t phase;                  /* MHE_PHASE_*, at the moment */
+    const mhe_layout *layout;       /* of states, controls, inputs, parameters */
+    int32_t n_joints;               /* that reactions are given of; 0: output.reactions is none */
+    const char *const *joint_names; /* [n_joints] "hip_r_on_femur_r_in_femur_r": the joint, the
+                                     * body it carries, whose axes */
 } mhe_estimator_info;
 
 /* Row i of the table. [any] */
@@ -205,6 +209,10 @@ typedef struct mhe_estimate {
     const mhe_layout *layout;   /* names and places of what follows: every block of the system */
     const double *states;       /* [layout->n_x] */
     const double *controls;     /* [layout->n_u]; at the last node those that lead to it */
+    const double *inputs;       /* [layout->n_w] of forces, at this time; NULL: there are none */
+    const double *reactions;    /* [n_joints x 6] force, N, and moment, N m, on the child at the
+                                 * joint's centre; NULL: output.reactions is none, or NaN: none
+                                 * could be found */
 } mhe_estimate;
 
 /* Values of a block of an estimate [block->count]; NULL: it is no state or control. [any] */

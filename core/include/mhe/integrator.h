@@ -16,8 +16,8 @@
  * each other, their muscle's a and c, and through its length and velocity q and v. They may be
  * stiff (eigenvalues of 1e4 1/s and more). Derivatives are partial: activation-driven, a and c are
  * the same numbers, and what a control does to z is the sum of both. r are controls that act on the
- * skeleton: residual joint torques. What keeps loops of the model closed is part of f. The layout
- * names all of them.
+ * skeleton: residual joint torques and actuators. What keeps loops of the model closed is part of
+ * f. The layout names all of them.
  */
 #ifndef MHE_INTEGRATOR_H
 #define MHE_INTEGRATOR_H

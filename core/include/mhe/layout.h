@@ -12,6 +12,8 @@
  *   control    excitation       muscles, excitation-driven; 1
  *   control    activation       muscles, activation-driven; 1
  *   control    residual_torque  coordinates, where switched on; N m (N)
+ *   control    actuator         actuators of the model file, where switched on; 1, in parts of
+ *                               their optimal force
  *   input      <force's name>   what a force plugin is fed with at every node
  *   parameter  <name>           what a run may estimate; constant over its nodes */
 #ifndef MHE_LAYOUT_H

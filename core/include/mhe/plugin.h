@@ -25,6 +25,9 @@ extern "C" {
 /* The library underneath allocates during [hot] calls (Simbody); such a plugin is measured instead
  * of refused. */
 #define MHE_FLAG_HOT_ALLOCATES 1u
+/* A cost that compares controls, which are constant over the interval behind their node, with the
+ * mean EMG of that interval; without it, with the EMG at the node. `emg.sample` overrules it. */
+#define MHE_FLAG_MEAN_TARGETS 2u
 
 typedef struct mhe_plugin {
     uint32_t size;  /* sizeof(mhe_plugin) when the plugin was compiled */

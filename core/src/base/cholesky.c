@@ -1,7 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "base/cholesky.h"
 
+#include "base/clones.h"
+
 #include <math.h>
+
+/* Four doubles, wherever they lie. */
+typedef double lanes __attribute__((vector_size(32), aligned(8), may_alias));
 
 int mhi_cholesky_factor(double *A, int32_t n) {
     for (int32_t j = 0; j < n; j++) {
@@ -39,19 +44,71 @@ static void scale(double *row, double factor, int32_t n) {
     }
 }
 
-void mhi_cholesky_solve(const double *L, int32_t n, double *B, int32_t n_columns) {
+/* 4 `wide` columns of B, whose sums stay in registers; `wide` is a constant once inlined. */
+__attribute__((always_inline)) static inline void solve_strip(int32_t wide, const double *L,
+                                                              int32_t n, double *B, int32_t ld) {
     for (int32_t i = 0; i < n; i++) {
-        for (int32_t k = 0; k < i; k++) {
-            subtract(B + i * n_columns, B + k * n_columns, L[i * n + k], n_columns);
+        lanes sum[4];
+        for (int32_t c = 0; c < wide; c++) {
+            sum[c] = *(lanes *)(B + i * ld + 4 * c);
         }
-        scale(B + i * n_columns, L[i * n + i], n_columns);
+        for (int32_t k = 0; k < i; k++) {
+            for (int32_t c = 0; c < wide; c++) {
+                sum[c] -= L[i * n + k] * *(lanes *)(B + k * ld + 4 * c);
+            }
+        }
+        for (int32_t c = 0; c < wide; c++) {
+            *(lanes *)(B + i * ld + 4 * c) = L[i * n + i] * sum[c];
+        }
     }
     for (int32_t i = n - 1; i >= 0; i--) {
-        for (int32_t k = i + 1; k < n; k++) {
-            subtract(B + i * n_columns, B + k * n_columns, L[k * n + i], n_columns);
+        lanes sum[4];
+        for (int32_t c = 0; c < wide; c++) {
+            sum[c] = *(lanes *)(B + i * ld + 4 * c);
         }
-        scale(B + i * n_columns, L[i * n + i], n_columns);
+        for (int32_t k = i + 1; k < n; k++) {
+            for (int32_t c = 0; c < wide; c++) {
+                sum[c] -= L[k * n + i] * *(lanes *)(B + k * ld + 4 * c);
+            }
+        }
+        for (int32_t c = 0; c < wide; c++) {
+            *(lanes *)(B + i * ld + 4 * c) = L[i * n + i] * sum[c];
+        }
     }
+}
+
+static void solve_column(const double *L, int32_t n, double *B, int32_t ld) {
+    for (int32_t i = 0; i < n; i++) {
+        double sum = B[i * ld];
+        for (int32_t k = 0; k < i; k++) {
+            sum -= L[i * n + k] * B[k * ld];
+        }
+        B[i * ld] = sum * L[i * n + i];
+    }
+    for (int32_t i = n - 1; i >= 0; i--) {
+        double sum = B[i * ld];
+        for (int32_t k = i + 1; k < n; k++) {
+            sum -= L[k * n + i] * B[k * ld];
+        }
+        B[i * ld] = sum * L[i * n + i];
+    }
+}
+
+CLONES static void solve_columns(const double *L, int32_t n, double *B, int32_t n_columns) {
+    int32_t c = 0;
+    for (; c + 16 <= n_columns; c += 16) {
+        solve_strip(4, L, n, B + c, n_columns);
+    }
+    for (; c + 4 <= n_columns; c += 4) {
+        solve_strip(1, L, n, B + c, n_columns);
+    }
+    for (; c < n_columns; c++) {
+        solve_column(L, n, B + c, n_columns);
+    }
+}
+
+void mhi_cholesky_solve(const double *L, int32_t n, double *B, int32_t n_columns) {
+    solve_columns(L, n, B, n_columns);
 }
 
 #define REPEATED 1e-11

@@ -34,6 +34,12 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *model,
  */
 void mhi_believe_markers(const mhi_run *run, const mhe_description *model,
                          const mhi_recording *recording, mhi_findings *findings);
+/* believe_loads.c: data.external_loads against gravity, the model's weight and the markers: other
+ * axes, a wrong sign or unit, points far off the body, a plate whose zero is none. MHE_E_INPUT: the
+ * files. [cold] */
+mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *model,
+                             const mhi_recording *recording, mhi_findings *findings,
+                             mhe_error *err);
 /* believe_fit.c: the markers against the model: one turn, shift, mirror or scale of all of them,
  * which data.transform can undo, is searched for before single ones are blamed. MHE_E_*: the
  * model's. [cold] */

@@ -252,6 +252,28 @@ static mhe_status read_costs(const struct reader *r, const mhi_node *owner, cons
     return status;
 }
 
+/* A plugin's own keys where data.FILE stands for it: the file, and what data.transform says of the
+ * frame that it is in. */
+static void fill_file(const mhi_run *run, const mhe_plugin *plugin, const char *file,
+                      void *config) {
+    const mhi_transform_section *t = &run->transform;
+    const double scale = t->scale == 0 ? 1 : t->scale; /* of a run without that section */
+    const mhe_real_list turn = {.values = t->turn, .n = t->scale == 0 ? 0 : 9};
+    for (uint32_t i = 0; i < plugin->option_count; i++) {
+        const mhe_option *o = &plugin->options[i];
+        char *field = (char *)config + o->offset;
+        if (strcmp(o->key, "file") == 0 && o->type == MHE_TYPE_PATH) {
+            memcpy(field, &file, sizeof file);
+        } else if (strcmp(o->key, "turn") == 0 && o->type == MHE_TYPE_REAL_LIST) {
+            memcpy(field, &turn, sizeof turn);
+        } else if (strcmp(o->key, "shift") == 0 && o->type == MHE_TYPE_REAL_LIST) {
+            memcpy(field, &t->shift, sizeof t->shift);
+        } else if (strcmp(o->key, "scale") == 0 && o->type == MHE_TYPE_REAL) {
+            memcpy(field, &scale, sizeof scale);
+        }
+    }
+}
+
 /* A use that no list of the file holds: with its defaults, and `file` for its key of that name. */
 static mhe_status read_other_force(const struct reader *r, const mhi_section *section,
                                    const char *id, const char *file, const mhi_node *node,
@@ -267,10 +289,8 @@ static mhe_status read_other_force(const struct reader *r, const mhi_section *se
     if (config == NULL) {
         return no_memory(r);
     }
-    for (uint32_t i = 0; i < plugin->option_count && file != NULL; i++) {
-        if (strcmp(plugin->options[i].key, "file") == 0) {
-            memcpy((char *)config + plugin->options[i].offset, &file, sizeof file);
-        }
+    if (file != NULL) {
+        fill_file(run, plugin, file, config);
     }
     if (file == NULL) {
         status = mhi_options_fill(plugin->options, (int32_t)plugin->option_count, run->tree, NULL,
@@ -402,6 +422,14 @@ static mhe_status check_run(const struct reader *r) {
     const int by_activation = run->formulation == MHE_FORMULATION_ACTIVATION;
     if (run->data.emg_delay < 0) {
         run->data.emg_delay = by_activation && run->emg.n_channels == 0 ? 2 : 0;
+    }
+    for (int32_t i = 0; i < run->n_costs && run->emg.sample == MHI_EMG_SAMPLE_BY_COST; i++) {
+        if (run->costs[i].plugin->flags & MHE_FLAG_MEAN_TARGETS) {
+            run->emg.sample = MHI_EMG_SAMPLE_MEAN;
+        }
+    }
+    if (run->emg.sample == MHI_EMG_SAMPLE_BY_COST) {
+        run->emg.sample = MHI_EMG_SAMPLE_NODE;
     }
     if (run->emg.delay < 0) {
         run->emg.delay = by_activation ? 0.02 : 0;

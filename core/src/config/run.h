@@ -64,6 +64,11 @@ typedef struct mhi_transform_section {
     double turn[9]; /* what `rotate` means, row-major */
 } mhi_transform_section;
 
+/* What a node's controls are compared with. */
+#define MHI_EMG_SAMPLE_BY_COST 0
+#define MHI_EMG_SAMPLE_NODE 1
+#define MHI_EMG_SAMPLE_MEAN 2
+
 #define MHI_EMG_LOW_PASS 0
 #define MHI_EMG_AVERAGE 1
 #define MHI_EMG_RMS 2
@@ -82,6 +87,7 @@ typedef struct mhi_emg_channel {
 /* From electrodes to muscles; without channels the columns of data.emg are muscles, and this
  * section does nothing. */
 typedef struct mhi_emg_section {
+    int32_t sample;  /* MHI_EMG_SAMPLE_*; by the costs, resolved when read */
     int32_t process; /* 0: the columns are envelopes */
     int32_t band_order;
     double band_low, band_high; /* Hz */
@@ -110,6 +116,7 @@ typedef struct mhi_horizon_section {
 
 typedef struct mhi_bounds_section {
     int32_t residual_torques;            /* 0: none; 1: one per coordinate */
+    int32_t actuators;                   /* 1: those of the model are controls */
     double residual_torque_max;          /* N m */
     mhe_text_list residual_torque_at;    /* coordinates that have one; n = 0: all */
     mhe_text_map residual_torque_limits; /* coordinate: largest magnitude, N m */
@@ -125,7 +132,8 @@ typedef struct mhi_realtime_section {
 typedef struct mhi_output_section {
     const char *node_name; /* as written; "auto" is left to the program */
     int32_t node;          /* what it means: 0 .. window; "auto": 0 */
-    int32_t picture; /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t picture;   /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t reactions; /* MHI_IN_* of model/joints.h */
     mhe_text_list formats;         /* of "sto", "csv", "mat"; .sto is written in any case */
     int32_t skip_first, skip_last; /* estimates left out of the errors in summary.json */
 } mhi_output_section;

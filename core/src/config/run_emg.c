@@ -50,6 +50,9 @@ mhe_status mhi_run_read_channels(mhi_run *run, mhe_error *err) {
     if (section == NULL || mhi_node_is_null(section) || section->first == NULL) {
         return MHE_OK;
     }
+    if (list == NULL && section->first->next == NULL && mhi_node_find(section, "sample") != NULL) {
+        return MHE_OK; /* it concerns columns of muscles, too */
+    }
     if (list == NULL) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, section,
                            "emg: 'channels' is missing, the list of electrodes: "

@@ -86,10 +86,10 @@ static const mhe_option data_options[] = {
 };
 
 static const mhe_option transform_options[] = {
-    MHE_OPT_TEXTS(
-        mhi_transform_section, rotate, 0,
-        "Turn about an axis by degrees: x-90, or [AXIS, DEGREES], where the axis is x, y, z "
-        "or [a, b, c]."),
+    MHE_OPT_TEXTS(mhi_transform_section, rotate, 0,
+                  "Turn about an axis by degrees (of markers, and of external loads in ground): "
+                  "x-90, or [AXIS, DEGREES], where the axis is x, y, z "
+                  "or [a, b, c]."),
     MHE_OPT_REALS(mhi_transform_section, shift, 0, -DBL_MAX, DBL_MAX, "m",
                   "Added afterwards, in the model's frame."),
     MHE_OPT_REAL(mhi_transform_section, scale, 1, -1e6, 1e6, "1",
@@ -97,6 +97,9 @@ static const mhe_option transform_options[] = {
 };
 
 static const mhe_option emg_options[] = {
+    MHE_OPT_ENUM(mhi_emg_section, sample, "cost", "cost|node|mean",
+                 "EMG that a node's controls are compared with: at the node, or the mean until the "
+                 "next node; cost: as the costs want it."),
     MHE_OPT_BOOL(mhi_emg_section, process, 1,
                  "Band-pass, rectify and smooth; false: the columns are envelopes."),
     MHE_OPT_INT(mhi_emg_section, band_order, 2, 0, 8, "1",
@@ -152,6 +155,9 @@ static const mhe_option horizon_options[] = {
 
 static const mhe_option bounds_options[] = {
     MHE_OPT_BOOL(mhi_bounds_section, residual_torques, 0, "Add a free torque at every coordinate."),
+    MHE_OPT_BOOL(mhi_bounds_section, actuators, 0,
+                 "Drive the model file's actuators: controls in parts of their optimal force, "
+                 "within its min_control and max_control."),
     MHE_OPT_REAL(mhi_bounds_section, residual_torque_max, 100, 0, INFINITY, "N m",
                  "Largest magnitude of a residual torque."),
     MHE_OPT_TEXTS(mhi_bounds_section, residual_torque_at, 0,
@@ -205,6 +211,9 @@ static const mhe_option output_options[] = {
                  "Draw estimated against reference, where gnuplot is installed."),
     MHE_OPT_TEXTS(mhi_output_section, formats, 0,
                   "Formats of the results beside .sto: csv, mat (MATLAB, all in results.mat)."),
+    MHE_OPT_ENUM(mhi_output_section, reactions, "none", "none|child|parent|ground",
+                 "What joints transmit, force and moment on the child at the joint's centre, in "
+                 "the axes of the child, of the parent or of ground (reactions.sto)."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
                 "Estimates at the start that the errors in summary.json leave out."),
     MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",
@@ -246,8 +255,8 @@ static const mhi_section sections[] = {
         "From the frame of the recording's markers to the model's: first turned and scaled, then "
         "shifted.",
         NULL, transform_options, AT(transform)),
-    SECTION("emg", "From electrodes to muscles; to be given with channels.", NULL, emg_options,
-            AT(emg)),
+    SECTION("emg", "From electrodes to muscles; to be given with channels, but for sample.", NULL,
+            emg_options, AT(emg)),
     SECTION("emg.channels", "A list: the electrodes. Muscles that none of them names have no EMG.",
             NULL, channel_options, 0),
     SECTION("initial", "Start of the motion.", NULL, initial_options, AT(initial)),

@@ -236,6 +236,35 @@ void mhi_electrodes_at(const mhi_electrodes *e, double time, double *emg) {
     }
 }
 
+void mhi_electrodes_mean(const mhi_electrodes *e, double time, double span, double *emg) {
+    const double from = time - e->shift, to = from + span;
+    mhi_electrodes_at(e, time, emg);
+    if (!(span > 0) || e->n_pushed == 0) {
+        return;
+    }
+    const int64_t oldest = e->n_pushed < e->capacity ? 0 : e->n_pushed - e->capacity;
+    int64_t end = e->n_pushed, first;
+    while (end > oldest && e->times[(end - 1) % e->capacity] >= to - MHI_SAME_TIME) {
+        end--;
+    }
+    first = end;
+    while (first > oldest && e->times[(first - 1) % e->capacity] >= from - MHI_SAME_TIME) {
+        first--;
+    }
+    for (int32_t i = 0; i < e->n_wires && first < end; i++) {
+        const wire *w = &e->wires[i];
+        double sum = 0;
+        int32_t n = 0;
+        for (int64_t k = first; k < end; k++) {
+            const ptrdiff_t slot = (ptrdiff_t)(k % e->capacity) * e->n_channels;
+            const double value = e->values[slot + w->channel] * w->factor;
+            n += !isnan(value);
+            sum += isnan(value) ? 0 : fmin(fmax(value, 0), e->max);
+        }
+        emg[w->muscle] = n > 0 ? sum / n : NAN;
+    }
+}
+
 int32_t mhi_electrodes_peak(mhi_electrodes *e, int32_t channel, int32_t reset, double *peak) {
     if (channel < 0 || channel >= e->n_channels || e->column[channel] < 0) {
         return 0;

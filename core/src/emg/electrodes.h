@@ -42,6 +42,9 @@ void mhi_electrodes_push(mhi_electrodes *electrodes, double time, const double *
 /* Normalised EMG [n_muscles] at a time; NaN: no electrode, or nothing measured. Samples of the last
  * second are kept. [hot] */
 void mhi_electrodes_at(const mhi_electrodes *electrodes, double time, double *emg);
+/* The same as a mean of the samples from a time on, `span` s long, those that are there so far;
+ * where there is none, that at the time. With span 0: mhi_electrodes_at(). [hot] */
+void mhi_electrodes_mean(const mhi_electrodes *electrodes, double time, double span, double *emg);
 /* Largest envelope of a channel so far, in the column's unit, NaN before the first; with `reset`
  * the search begins anew. 0: it is no column. [any] */
 int32_t mhi_electrodes_peak(mhi_electrodes *electrodes, int32_t channel, int32_t reset,
@@ -68,11 +71,12 @@ typedef struct mhi_emg_report {
     double offset, filter_delay, lag; /* s */
 } mhi_emg_report;
 
-/* The file data.emg on frames at time [n_frames]: emg [n_frames x n_muscles]. `table` is changed.
- * What looks wrong in the data is told to the host, or refused where it cannot be right.
- * MHE_E_INPUT, MHE_E_CONFIG. [cold] */
+/* The file data.emg on frames at time [n_frames], `step` s apart: emg [n_frames x n_muscles], at
+ * the frames or the mean until the next, as run->emg.sample says. `table` is changed. What looks
+ * wrong in the data is told to the host, or refused where it cannot be right. MHE_E_INPUT,
+ * MHE_E_CONFIG. [cold] */
 mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
-                               const double *time, int32_t n_frames, double *emg,
+                               const double *time, int32_t n_frames, double step, double *emg,
                                int32_t *n_muscles_found, mhi_emg_report *report,
                                const mhe_host *host, mhe_error *err);
 

@@ -103,7 +103,7 @@ mhe_status mhi_electrodes_mvc(const mhi_run *run, const mhe_description *model, 
 }
 
 mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
-                               const double *time, int32_t n_frames, double *emg,
+                               const double *time, int32_t n_frames, double step, double *emg,
                                int32_t *n_muscles_found, mhi_emg_report *report,
                                const mhe_host *host, mhe_error *err) {
     mhi_electrodes *e = NULL;
@@ -131,13 +131,14 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
     }
     if (status == MHE_OK) {
         int32_t next = 0;
+        const double span = run->emg.sample == MHI_EMG_SAMPLE_MEAN ? step : 0;
         for (int32_t k = 0; k < n_frames; k++) {
-            for (; next < table->n_rows && table->time[next] + e->offset <= time[k] + MHI_SAME_TIME;
-                 next++) {
+            const double end = time[k] + span + (span > 0 ? -MHI_SAME_TIME : MHI_SAME_TIME);
+            for (; next < table->n_rows && table->time[next] + e->offset <= end; next++) {
                 mhi_electrodes_push(e, table->time[next],
                                     table->values + (ptrdiff_t)next * table->n_columns);
             }
-            mhi_electrodes_at(e, time[k], emg + (ptrdiff_t)k * e->n_muscles);
+            mhi_electrodes_mean(e, time[k], span, emg + (ptrdiff_t)k * e->n_muscles);
         }
         *n_muscles_found = 0;
         for (int32_t i = 0; i < e->n_wires; i++) {

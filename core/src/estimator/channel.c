@@ -51,11 +51,13 @@ static mhe_status take_rows(mhi_channel *c, int32_t nodes, mhi_arena *arena, mhe
     c->believed = MHI_TAKE(arena, double, n);
     c->why = MHI_TAKE(arena, int32_t, n);
     c->late = MHI_TAKE(arena, uint8_t, n);
+    c->sums = MHI_TAKE(arena, double, 6 * width);
+    c->n_in_mean = MHI_TAKE(arena, int32_t, width);
     c->line = MHI_TAKE(arena, double, (c->frames + 1) * width);
     c->absent = MHI_TAKE(arena, double, width);
     c->found = MHI_TAKE(arena, double, width);
-    if (!c->measured || !c->believed || !c->why || !c->late || !c->line || !c->absent ||
-        !c->found) {
+    if (!c->measured || !c->believed || !c->why || !c->late || !c->sums || !c->n_in_mean ||
+        !c->line || !c->absent || !c->found) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     for (ptrdiff_t i = 0; i < width; i++) {
@@ -127,9 +129,10 @@ mhe_status mhi_channels_create(const mhi_run *run, const mhi_ocp *ocp, const mhe
     const mhe_problem *p = mhi_ocp_problem(ocp);
     const int32_t control = p->formulation == MHE_FORMULATION_EXCITATION ? MHI_SIGNAL_EXCITATION
                                                                          : MHI_SIGNAL_ACTIVATION;
+    const int32_t emg_rule = run->emg.sample == MHI_EMG_SAMPLE_MEAN ? MHE_GAP_MEAN : MHE_GAP_HOLD;
     const row_setup setups[] = {{"markers", MHI_SIGNAL_MARKERS, 1, MHI_TRUST_POSITION,
                                  MHE_GAP_LINEAR, 2, 0, p->n_markers, 3, p->marker_names},
-                                {"emg", control, 0, MHI_TRUST_RAILS, MHE_GAP_HOLD, 1,
+                                {"emg", control, 0, MHI_TRUST_RAILS, emg_rule, 1,
                                  run->data.emg_delay, p->n_muscles, 1, p->muscle_names},
                                 {"angles", MHI_SIGNAL_Q, 1, MHI_TRUST_ALL, MHE_GAP_LINEAR, 2, 0,
                                  p->n_q, 1, p->coordinate_names},
@@ -174,6 +177,7 @@ void mhi_channels_set_interval(mhi_channels *channels, double interval, int32_t 
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_channel *c = &channels->rows[i];
         c->face.gap = c->gap_nodes * interval;
+        c->span = c->face.gap_rule == MHE_GAP_MEAN ? interval : 0;
         c->face.delay = c->frames * interval / ratio;
         c->samples.changed = c->samples.n > 0 ? -INFINITY : INFINITY; /* for every node */
         channels->faces[i] = c->face;
@@ -226,6 +230,25 @@ void mhi_channel_set(mhi_channel *c, int32_t k, const double *values) {
     for (int32_t i = 0; i < width; i++) {
         c->why[at + i] = isnan(values[i]) ? MHE_TRACK_MISSING : MHE_TRACK_USED;
         c->late[at + i] = (uint8_t)(c->why[at + i] == MHE_TRACK_MISSING);
+        c->n_in_mean[i] = !isnan(values[i]);
+    }
+}
+
+void mhi_channel_add(mhi_channel *c, int32_t k, const double *values) {
+    const ptrdiff_t at = (ptrdiff_t)k * c->face.width;
+    for (int32_t i = 0; i < c->face.width && c->face.gap_rule == MHE_GAP_MEAN; i++) {
+        double *measured = &c->measured[at + i];
+        if (isnan(values[i]) || (c->late[at + i] && !isnan(*measured))) {
+            continue; /* nothing new, or what samples say of the node */
+        }
+        c->n_in_mean[i]++;
+        *measured =
+            isnan(*measured) ? values[i] : *measured + (values[i] - *measured) / c->n_in_mean[i];
+        c->late[at + i] = 0;
+        if (c->why[at + i] == MHE_TRACK_MISSING || c->why[at + i] == MHE_TRACK_USED) {
+            c->believed[at + i] = *measured;
+            c->why[at + i] = MHE_TRACK_USED;
+        }
     }
 }
 
@@ -245,12 +268,39 @@ int32_t mhi_channel_any(const double *values, int32_t n) {
     return found;
 }
 
+/* Node k into the sums of a channel's values: number, values, squares [width] each. */
+static void add_to_sums(const mhi_channel *c, int32_t k, double *sums) {
+    const int32_t width = c->face.width;
+    const double *values = c->measured + (ptrdiff_t)k * width;
+    for (int32_t i = 0; i < width; i++) {
+        if (!isnan(values[i])) {
+            sums[i]++;
+            sums[width + i] += values[i];
+            sums[2 * width + i] += values[i] * values[i];
+        }
+    }
+}
+
+void mhi_channel_spread(mhi_channel *c, int32_t filled, double *spread) {
+    const int32_t width = c->face.width;
+    double *now = c->sums + 3 * width;
+    memcpy(now, c->sums, 3 * sizeof *now * (size_t)width);
+    for (int32_t k = 0; k < filled; k++) {
+        add_to_sums(c, k, now);
+    }
+    for (int32_t i = 0; i < width; i++) {
+        const double n = now[i], mean = now[width + i] / n;
+        spread[i] = n > 0 ? sqrt(fmax(0, now[2 * width + i] / n - mean * mean)) : NAN;
+    }
+}
+
 void mhi_channels_shift(mhi_channels *channels, int32_t filled) {
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_channel *c = &channels->rows[i];
         const size_t width = (size_t)c->face.width, rest = (size_t)(channels->nodes - 1) * width;
         if (filled > 0) {
             c->counts.n_nodes++;
+            add_to_sums(c, 0, c->sums);
             c->counts.n_empty += !mhi_channel_any(c->measured, c->face.width);
         }
         memmove(c->measured, c->measured + width, sizeof(double) * rest);

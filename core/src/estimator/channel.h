@@ -28,13 +28,16 @@ typedef struct mhi_channel {
     int32_t read;      /* a cost reads the signal */
     int32_t frames;    /* by which what a node tracks lags behind */
     int32_t gap_nodes; /* the longest gap, in intervals */
+    double span;       /* s that a node's mean is over; 0: not known, or no mean */
 
     /* Rows of the window's nodes, oldest first. */
     double *measured; /* [nodes x width] */
     double *believed; /* the same, NaN where trust.c does not believe it: the targets */
     int32_t *why;     /* [nodes x width] MHE_TRACK_* */
+    double *sums;     /* [6 x width] over nodes that have left the window; and with those in it */
     uint8_t *late;    /* [nodes x width] 0: it came with the frame, which nothing later changes */
 
+    int32_t *n_in_mean;     /* [width] frames in the newest node's mean */
     double *line;           /* [(frames+1) x width] of the last frames */
     double *absent, *found; /* [width] all missing; scratch */
     mhi_samples samples;
@@ -67,8 +70,13 @@ const double *mhi_channel_delayed(const mhi_channels *channels, int32_t i, const
 
 /* Node k becomes `values` [width]. */
 void mhi_channel_set(mhi_channel *channel, int32_t k, const double *values);
+/* Node k, which a frame began, goes on: the next frame's `values`, in a channel of means. */
+void mhi_channel_add(mhi_channel *channel, int32_t k, const double *values);
 /* All nodes are believed again. */
 void mhi_channel_believe(mhi_channel *channel, int32_t nodes);
+/* Standard deviation [width] of all that was measured so far, with the `filled` nodes of the
+ * window; NaN: nothing was. */
+void mhi_channel_spread(mhi_channel *channel, int32_t filled, double *spread);
 /* The oldest of the nodes is dropped; the newest stands twice. */
 void mhi_channels_shift(mhi_channels *channels, int32_t filled);
 int32_t mhi_channel_any(const double *values, int32_t n); /* one of them is not NaN */

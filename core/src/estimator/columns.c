@@ -222,3 +222,18 @@ double mhi_column_at(const mhi_table *table, int32_t column, double time, int32_
     const double step = table->time[row + 1] - table->time[row];
     return *value + (value[table->n_columns] - *value) * since / step;
 }
+
+double mhi_column_mean(const mhi_table *table, int32_t column, double time, double span) {
+    if (column < 0) {
+        return NAN;
+    }
+    double sum = 0;
+    int32_t n = 0, row = row_before(table, time);
+    row = row >= 0 && fabs(table->time[row] - time) <= SAME_TIME ? row : row + 1;
+    for (; row < table->n_rows && table->time[row] < time + span - SAME_TIME; row++) {
+        const double value = table->values[(ptrdiff_t)row * table->n_columns + column];
+        n += !isnan(value);
+        sum += isnan(value) ? 0 : value;
+    }
+    return n > 0 ? sum / n : mhi_column_at(table, column, time, 0);
+}

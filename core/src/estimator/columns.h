@@ -28,5 +28,7 @@ mhe_status mhi_columns_match(const mhi_table *table, const mhi_naming *naming,
 /* Value of a column at a time: the row within half a microsecond of it, else linear between
  * neighbours (`hold`: the row before); NaN outside the table and beside missing values. */
 double mhi_column_at(const mhi_table *table, int32_t column, double time, int32_t hold);
+/* The mean of the rows from `time` on, `span` s long; where there is none, the value at `time`. */
+double mhi_column_mean(const mhi_table *table, int32_t column, double time, double span);
 
 #endif

@@ -15,7 +15,7 @@ mhe_status mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *in
                                      .n_q = e->n_q,
                                      .n_muscles = e->n_m,
                                      .n_markers = e->n_k,
-                                     .n_residual_torques = e->n_r,
+                                     .n_residual_torques = p->n_residual_torques,
                                      .window = e->window.n,
                                      .ratio = e->run->horizon.ratio,
                                      .interval = p->interval,
@@ -30,7 +30,10 @@ mhe_status mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *in
                                      .channel_size = sizeof(mhe_channel),
                                      .channels = e->channels.faces,
                                      .phase = e->phase,
-                                     .layout = p->layout};
+                                     .layout = p->layout,
+                                     .n_joints =
+                                         e->reactions != NULL ? e->description->n_bodies : 0,
+                                     .joint_names = e->joint_names};
     return mhi_give(__func__, info, &ours, NULL);
 }
 

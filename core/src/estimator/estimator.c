@@ -67,6 +67,22 @@ mhe_status mhe_estimator_covers(const mhe_estimator *e, double first, double las
     return status;
 }
 
+/* As OpenSim calls them: "hip_r_on_femur_r_in_femur_r". */
+static mhe_status name_joints(mhe_estimator *e, mhe_error *err) {
+    const mhe_description *d = e->description;
+    const int32_t axes = e->run->output.reactions;
+    e->joint_names = MHI_TAKE(&e->arena, const char *, d->n_bodies);
+    for (int32_t i = 0; i < d->n_bodies && e->joint_names != NULL; i++) {
+        const mhe_body *b = &d->bodies[i];
+        const int32_t of = axes == MHI_IN_CHILD ? i : axes == MHI_IN_PARENT ? b->parent : -1;
+        const char *joint = d->joints != NULL && d->joints[i] != NULL ? d->joints[i] : b->name;
+        e->joint_names[i] = mhi_arena_format(&e->arena, "%s_on_%s_in_%s", joint, b->name,
+                                             of < 0 ? "ground" : d->bodies[of].name);
+    }
+    return e->joint_names == NULL || e->arena.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                                     : MHE_OK;
+}
+
 static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     const mhi_run *run = e->run;
     mhi_bounds bounds;
@@ -91,10 +107,18 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
                                      .muscle_config = run->muscle.config,
                                      .formulation = run->formulation,
                                      .residual_torques = run->bounds.residual_torques,
+                                     .actuators = run->bounds.actuators,
                                      .forces = forces,
                                      .n_forces = n_forces,
                                      .bounds = &bounds};
     status = mhi_system_create(&system, &e->system, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    if (run->output.reactions != MHI_IN_NONE) {
+        status = mhi_reactions_create(&system, e->system, &e->reactions, err);
+        status = status == MHE_OK ? name_joints(e, err) : status;
+    }
     if (status != MHE_OK) {
         return status;
     }
@@ -160,8 +184,9 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
                                   n + 1, &e->arena, err);
     }
     if (status == MHE_OK) {
-        status = mhi_output_create(&e->output, mhi_system_face(e->system), e->n_k, &e->channels,
-                                   &e->arena, err);
+        status = mhi_output_create(&e->output, mhi_system_face(e->system), e->n_k,
+                                   e->reactions != NULL ? e->description->n_bodies : 0,
+                                   &e->channels, &e->arena, err);
     }
     return status;
 }
@@ -261,6 +286,7 @@ void mhe_estimator_close(mhe_estimator *e) {
     if (e->solver_self != NULL) {
         e->solver->destroy(e->solver_self);
     }
+    mhi_reactions_free(e->reactions);
     mhi_ocp_free(e->ocp);
     mhi_system_free(e->system);
     mhi_description_free(e->owned_description);

@@ -21,6 +21,7 @@
 #include "estimator/tasks.h"
 #include "estimator/trust.h"
 #include "estimator/window.h"
+#include "model/joints.h"
 
 #include <math.h>
 #include <mhe/config.h>
@@ -36,7 +37,9 @@ struct mhe_estimator {
     mhe_description *owned_description; /* NULL where it was lent */
     const mhe_description *description;
     mhi_system *system;
-    const mhi_tasks *tasks; /* data.marker_weights; NULL: none */
+    mhi_reactions *reactions; /* NULL: not wanted */
+    const char **joint_names; /* [n_bodies] */
+    const mhi_tasks *tasks;   /* data.marker_weights; NULL: none */
     mhi_ocp *ocp;
     const mhe_solver_ops *solver;
     void *solver_self;
@@ -74,6 +77,9 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
 
 /* locked.c: takes what the model section locks out of a description just read. */
 mhe_status mhi_estimator_lock(const mhi_run *run, mhe_description *description, mhe_error *err);
+
+/* feed.c: means of the intervals that are not complete yet, as far as their samples go. */
+mhe_status mhi_feed_before_solve(mhe_estimator *e, mhe_error *err);
 
 /* Distance of two sets of n numbers, of which per_point make a point; NaN entries do not count. */
 double mhi_rms_distance(const double *a, const double *b, int32_t n, int32_t per_point);

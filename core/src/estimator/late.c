@@ -13,7 +13,8 @@
 static int32_t look(mhi_channel *c, double time, int32_t k) {
     const ptrdiff_t at = (ptrdiff_t)k * c->face.width;
     int32_t news = 0;
-    mhi_samples_at(&c->samples, c->face.gap_rule, c->face.gap, time - c->face.delay, c->found);
+    mhi_samples_at(&c->samples, c->face.gap_rule, c->face.gap, c->span, time - c->face.delay,
+                   c->found);
     for (int32_t i = 0; i < c->face.width; i++) {
         double *measured = &c->measured[at + i];
         if (!c->late[at + i] || isnan(c->found[i]) || c->found[i] == *measured) {
@@ -32,7 +33,7 @@ void mhi_channels_look(mhi_channels *channels, const double *times, int32_t fill
         mhi_channel *c = &channels->rows[i];
         for (int32_t k = 0; k < filled && c->samples.n > 0; k++) {
             const int32_t newest = k == filled - 1; /* nobody looked for it yet */
-            if (!newest && times[k] - c->face.delay < c->samples.changed) {
+            if (!newest && times[k] + c->span - c->face.delay < c->samples.changed) {
                 continue;
             }
             const int32_t empty =

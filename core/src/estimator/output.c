@@ -3,16 +3,25 @@
 
 #include <string.h>
 
-mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_k,
+mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_k, int32_t n_joints,
                              const mhi_channels *channels, mhi_arena *arena, mhe_error *err) {
     const int32_t n_q = system->n_q, n_m = system->n_m;
     struct {
         double **array;
         int32_t n;
-    } wanted[] = {{&o->x, system->n_x},  {&o->u, system->n_u}, {&o->held, system->n_u},
-                  {&o->q, n_q},          {&o->v, n_q},         {&o->activation, n_m},
-                  {&o->excitation, n_m}, {&o->force, n_m},     {&o->moment, n_q},
-                  {&o->residual, n_q},   {&o->marker, 3 * n_k}};
+    } wanted[] = {{&o->x, system->n_x},
+                  {&o->u, system->n_u},
+                  {&o->held, system->n_u},
+                  {&o->q, n_q},
+                  {&o->v, n_q},
+                  {&o->activation, n_m},
+                  {&o->excitation, n_m},
+                  {&o->force, n_m},
+                  {&o->moment, n_q},
+                  {&o->reaction, 6 * n_joints},
+                  {&o->input, system->n_w},
+                  {&o->residual, n_q},
+                  {&o->marker, 3 * n_k}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
         *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
         if (*wanted[i].array == NULL) {
@@ -119,7 +128,8 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
     memcpy(o->v, x + e->n_q, n_q);
     memcpy(o->activation, a, n_m);
     memcpy(o->excitation, u, n_m);
-    memcpy(o->residual, o->held + e->n_m, sizeof(double) * (size_t)e->n_r);
+    memcpy(o->residual, o->held + e->n_m,
+           sizeof(double) * (size_t)mhi_ocp_problem(e->ocp)->n_residual_torques);
     mhi_muscle_state muscles;
     mhi_system_context *context = mhi_ocp_context(e->ocp);
     mhe_system_point at;
@@ -131,6 +141,31 @@ static mhe_status give_values(mhe_estimator *e, int32_t k, int32_t controls, mhe
         status = mhi_system_markers(context, x, o->marker, NULL, err);
     }
     return status;
+}
+
+/* Inputs of forces at the time of node k. */
+static const double *give_inputs(mhe_estimator *e, int32_t k) {
+    const int32_t n_w = mhi_system_face(e->system)->n_w;
+    if (n_w == 0) {
+        return NULL;
+    }
+    memcpy(e->output.input, mhi_ocp_input(e->ocp, k), sizeof(double) * (size_t)n_w);
+    (void)mhi_system_inputs(e->system, e->window.times[k], e->output.input, NULL);
+    return e->output.input;
+}
+
+/* What joints transmit at node k, with the controls and the loads of its time. NaN: no answer. */
+static void give_reactions(mhe_estimator *e) {
+    mhi_output *o = &e->output;
+    const int32_t n_w = mhi_system_face(e->system)->n_w;
+    mhe_system_point at;
+    mhi_system_point(e->system, o->x, o->held, n_w > 0 ? o->input : NULL, &at);
+    if (mhi_reactions_solve(e->reactions, mhi_ocp_context(e->ocp), &at, e->run->output.reactions,
+                            o->reaction, NULL) != MHE_OK) {
+        for (int32_t i = 0; i < 6 * e->description->n_bodies; i++) {
+            o->reaction[i] = NAN;
+        }
+    }
 }
 
 mhe_status mhi_output_give(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_error *err) {
@@ -159,6 +194,11 @@ mhe_status mhi_output_give(mhe_estimator *e, int32_t k, mhe_estimate *out, mhe_e
     out->n_tracked = e->channels.n;
     out->tracked_size = sizeof(mhe_tracked);
     out->tracked = o->tracked;
+    out->inputs = give_inputs(e, k);
+    if (e->reactions != NULL) {
+        give_reactions(e);
+        out->reactions = o->reaction;
+    }
     out->layout = mhi_ocp_problem(e->ocp)->layout;
     out->states = o->x;
     out->controls = o->u;

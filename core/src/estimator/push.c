@@ -148,10 +148,15 @@ static void take_frame(mhe_estimator *e, const mhe_frame *frame, int32_t used) {
         mhi_trust_count(&e->trust, c, e->given[i]);
     }
     e->channels.n_frames++;
-    if (!used) {
+    if (!used && e->window.filled == 0) {
         return;
     }
-    mhi_window_append(e, frame->time, e->given);
+    if (used) {
+        mhi_window_append(e, frame->time, e->given);
+    }
+    for (int32_t i = 0; i < channels->n && !used; i++) {
+        mhi_channel_add(&channels->rows[i], e->window.filled - 1, e->given[i]);
+    }
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_trust_drop(&e->trust, &channels->rows[i], e->window.filled - 1);
     }
@@ -214,6 +219,10 @@ mhe_status mhe_estimator_push(mhe_estimator *e, const mhe_frame *frame, mhe_esti
     take_frame(e, &ours, used);
     if (!used || e->window.filled <= e->window.n) {
         return MHE_OK;
+    }
+    status = mhi_feed_before_solve(e, err);
+    if (status != MHE_OK) {
+        return status;
     }
     status = solve_window(e, &made, ready, err);
     return *ready ? mhi_give(__func__, estimate, &made, err) : status;

@@ -242,6 +242,7 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     }
     if (status == MHE_OK) {
         mhi_believe_markers(run, d, r, &r->findings);
+        status = mhi_believe_loads(run, d, r, &r->findings, err);
         mhi_findings_tell(&r->findings, told_from, told);
     }
     if (status == MHE_OK && run->data.reference != NULL) {

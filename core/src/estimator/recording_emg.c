@@ -51,9 +51,10 @@ static mhe_status read_electrodes(mhi_recording *r, const mhi_run *run, const mh
         return status;
     }
     r->emg = malloc(sizeof(double) * ((size_t)r->n_frames * (size_t)d->n_muscles + 1));
-    status = r->emg == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : mhi_electrodes_read(run, d, table, r->time, r->n_frames, r->emg,
-                                                  &r->n_emg_found, &r->emg_report, host, err);
+    status = r->emg == NULL
+                 ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                 : mhi_electrodes_read(run, d, table, r->time, r->n_frames, 1 / r->rate, r->emg,
+                                       &r->n_emg_found, &r->emg_report, host, err);
     if (status == MHE_OK) {
         tell_alignment(r, run, host);
     }
@@ -73,7 +74,9 @@ static mhe_status read_muscles(mhi_recording *r, const mhi_run *run, const mhe_d
                             ? mhi_recording_set_times(r, table, err)
                             : mhi_emg_check_times(table, 0, r->time, r->n_frames, err);
     if (status == MHE_OK) {
-        status = mhi_recording_columns(r, table, &naming, names, d->n_muscles, 1, 0, &r->emg,
+        const int32_t rows =
+            run->emg.sample == MHI_EMG_SAMPLE_MEAN ? MHI_ROWS_MEAN : MHI_ROWS_LINEAR;
+        status = mhi_recording_columns(r, table, &naming, names, d->n_muscles, 1, rows, &r->emg,
                                        &r->n_emg_found, host, err);
     }
     free(names);

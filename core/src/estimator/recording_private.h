@@ -28,11 +28,16 @@ mhe_status mhi_recording_set_times(mhi_recording *r, const mhi_table *table, mhe
 void mhi_recording_warn_uneven(const mhi_recording *r, const char *path, double window,
                                const mhe_host *host);
 
-/* One quantity of `n` names, `width` columns each, from a table onto the recording's times:
- * out [n_frames x n width], taken here. [cold] */
+/* What a frame takes of a table's rows. */
+#define MHI_ROWS_LINEAR 0 /* between those beside it */
+#define MHI_ROWS_HOLD 1   /* the last one */
+#define MHI_ROWS_MEAN 2   /* the mean of those before the next frame */
+
+/* One quantity of `n` names, `width` columns each, from a table onto the recording's times by
+ * MHI_ROWS_*: out [n_frames x n width], taken here. [cold] */
 mhe_status mhi_recording_columns(const mhi_recording *r, const mhi_table *table,
                                  const mhi_naming *naming, const char *const *names, int32_t n,
-                                 int32_t width, int32_t hold, double **out, int32_t *n_found,
+                                 int32_t width, int32_t rows, double **out, int32_t *n_found,
                                  const mhe_host *host, mhe_error *err);
 
 /* recording_emg.c: run->data.emg onto the frames' times; without any, its own become the frames',

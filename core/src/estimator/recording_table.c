@@ -21,7 +21,7 @@ const char **mhi_recording_names(const mhe_description *d, int kind, int32_t n) 
 
 mhe_status mhi_recording_columns(const mhi_recording *r, const mhi_table *table,
                                  const mhi_naming *naming, const char *const *names, int32_t n,
-                                 int32_t width, int32_t hold, double **out, int32_t *n_found,
+                                 int32_t width, int32_t rows, double **out, int32_t *n_found,
                                  const mhe_host *host, mhe_error *err) {
     const int32_t n_labels = table->n_columns / width;
     int32_t *column = calloc((size_t)n + 1, sizeof *column);
@@ -38,7 +38,11 @@ mhe_status mhi_recording_columns(const mhi_recording *r, const mhi_table *table,
         for (int32_t i = 0; i < n * width; i++) {
             const int32_t label = column[i / width];
             (*out)[(ptrdiff_t)k * n * width + i] =
-                label < 0 ? NAN : mhi_column_at(table, label * width + i % width, r->time[k], hold);
+                label < 0 ? NAN
+                : rows == MHI_ROWS_MEAN
+                    ? mhi_column_mean(table, label * width + i % width, r->time[k], 1 / r->rate)
+                    : mhi_column_at(table, label * width + i % width, r->time[k],
+                                    rows == MHI_ROWS_HOLD);
         }
     }
     free(column);

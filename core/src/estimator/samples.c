@@ -97,7 +97,29 @@ static void between(const mhi_samples *s, int32_t i, double since, double step, 
     }
 }
 
-void mhi_samples_at(const mhi_samples *s, int32_t rule, double gap, double time, double *values) {
+/* Mean of the samples from a time on, `span` s long; entries without any stay NaN. 0: no sample. */
+static int32_t mean(const mhi_samples *s, double span, double time, double *values) {
+    int32_t first = last_before(s, time), n = 0;
+    first = first >= 0 && fabs(time_of(s, first) - time) <= SAME_TIME ? first : first + 1;
+    const int32_t end = last_before(s, time + span - 2 * SAME_TIME) + 1;
+    for (int32_t j = 0; j < s->width; j++) {
+        double sum = 0;
+        n = 0;
+        for (int32_t i = first; i < end; i++) {
+            const double value = row(s, i)[j];
+            n += !isnan(value);
+            sum += isnan(value) ? 0 : value;
+        }
+        values[j] = n > 0 ? sum / n : NAN;
+    }
+    return first < end;
+}
+
+void mhi_samples_at(const mhi_samples *s, int32_t rule, double gap, double span, double time,
+                    double *values) {
+    if (rule == MHE_GAP_MEAN && mean(s, span, time, values)) {
+        return;
+    }
     const int32_t i = last_before(s, time), next = i + 1 < s->n;
     const double since = i < 0 ? INFINITY : time - time_of(s, i);
     const double until = next ? time_of(s, i + 1) - time : INFINITY;
@@ -109,7 +131,7 @@ void mhi_samples_at(const mhi_samples *s, int32_t rule, double gap, double time,
             between(s, i, since, since + until, values);
             return;
         }
-    } else if (rule == MHE_GAP_HOLD) {
+    } else if (rule == MHE_GAP_HOLD || rule == MHE_GAP_MEAN) {
         found = since <= gap + SAME_TIME ? i : -1;
     } else if (fmin(since, until) <= gap + SAME_TIME) {
         found = since <= until ? i : i + 1;

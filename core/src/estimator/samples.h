@@ -20,8 +20,9 @@ void mhi_samples_clear(mhi_samples *samples);
 /* A sample; one of the same time is replaced. The oldest goes where there is no room. Allocates at
  * the first one. */
 mhe_status mhi_samples_put(mhi_samples *samples, double time, const double *values, mhe_error *err);
-/* Values [width] at a time by a rule MHE_GAP_* over gaps of at most `gap` s; NaN: none. [hot] */
-void mhi_samples_at(const mhi_samples *samples, int32_t rule, double gap, double time,
+/* Values [width] at a time by a rule MHE_GAP_* over gaps of at most `gap` s, the mean over `span`
+ * s; NaN: none. [hot] */
+void mhi_samples_at(const mhi_samples *samples, int32_t rule, double gap, double span, double time,
                     double *values);
 
 #endif

@@ -91,6 +91,13 @@ void mhi_window_set_bounds(mhe_estimator *e) {
 }
 
 void mhi_window_set_targets(mhe_estimator *e) {
+    for (int32_t i = 0; i < e->channels.n;
+         i++) { /* of EMG, for costs that ask how much of it is noise */
+        mhi_channel *c = &e->channels.rows[i];
+        if (c->read && c->signal >= 0 && !c->posture) {
+            mhi_channel_spread(c, e->window.filled, mhi_ocp_target_spread(e->ocp, c->signal));
+        }
+    }
     for (int32_t k = 0; k <= e->window.n; k++) {
         mhi_ocp_set_time(e->ocp, k, e->window.times[k]);
         for (int32_t i = 0; i < e->channels.n; i++) {

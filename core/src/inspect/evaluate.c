@@ -265,7 +265,7 @@ static mhe_status answer(mhi_inspected *m, const mhi_pose *pose, results *r, cJS
         status = muscles(m, r, pose, out, err);
     }
     if (status == MHE_OK && pose->has_forces) {
-        status = mhi_reactions(m, pose, out, err);
+        status = mhi_pose_reactions(m, pose, out, err);
     }
     return status;
 }

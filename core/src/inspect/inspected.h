@@ -58,7 +58,7 @@ mhe_status mhi_pose_read(mhi_inspected *m, const char *name, const cJSON *node, 
                          mhi_pose *pose, mhe_error *err);
 
 /* Adds "reactions" to the answer of a pose. */
-mhe_status mhi_reactions(mhi_inspected *m, const mhi_pose *pose, cJSON *out, mhe_error *err);
+mhe_status mhi_pose_reactions(mhi_inspected *m, const mhi_pose *pose, cJSON *out, mhe_error *err);
 
 /* A JSON object's number, null where it is not finite. */
 void mhi_json_number(cJSON *object, const char *name, double value);

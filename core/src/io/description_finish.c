@@ -114,9 +114,7 @@ static double *locked_at(mhi_builder *b, const mhe_description *d, const int32_t
 /* Actuators do nothing unless they are driven. */
 static void note_undriven(mhi_builder *b, const mhe_description *d) {
     if (d->n_actuators > 0) {
-        mhi_build_dropped(b, 0,
-                          "%d actuator%s, not driven; residual torques do that work where "
-                          "bounds.residual_torques asks for them",
+        mhi_build_dropped(b, 0, "%d actuator%s, driven only where bounds.actuators asks for it",
                           (int)d->n_actuators, d->n_actuators == 1 ? "" : "s");
     }
 }

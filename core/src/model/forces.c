@@ -305,6 +305,23 @@ mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at
     return status;
 }
 
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
+                           mhi_force_loads *loads, void *data, mhe_error *err) {
+    const mhi_system *s = c->system;
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
+        const mhe_force_layout *l = &s->forces[i].layout;
+        status = evaluate_one(c, &s->forces[i], at, 0, err);
+        for (int32_t k = 0; k < l->n_paths && status == MHE_OK; k++) {
+            tension[l->paths[k]] += c->tension[k];
+        }
+        if (status == MHE_OK && l->n_loads > 0) {
+            status = loads(data, l->loads, l->n_loads, c->load, err);
+        }
+    }
+    return status;
+}
+
 mhe_status mhi_forces_check(mhi_system *s, mhe_error *err) {
     const mhe_description *d = s->description;
     const int32_t n_q = s->face.n_q;

@@ -193,6 +193,27 @@ static int states(maker *m) {
     return 1;
 }
 
+/* In parts of their optimal forces. */
+static int actuators(maker *m) {
+    const mhi_system *s = m->s;
+    entries e;
+    if (s->n_actuators == 0) {
+        return 1;
+    }
+    if (!begin(m, "actuator", MHE_ROLE_CONTROL, MHE_STRUCTURE_DENSE, s->n_actuators, &e)) {
+        return 0;
+    }
+    for (int32_t i = 0; i < s->n_actuators; i++) {
+        const mhe_actuator *a = &s->description->actuators[i];
+        e.names[i] = a->name;
+        e.units[i] = "1";
+        e.owner[i] = i;
+        e.lower[i] = isnan(a->min_control) ? -INFINITY : a->min_control;
+        e.upper[i] = isnan(a->max_control) ? INFINITY : a->max_control;
+    }
+    return 1;
+}
+
 static int controls(maker *m) {
     static const char *const unit[] = {"N m", "N"};
     static const double scale[] = {USUAL_TORQUE, USUAL_FORCE};
@@ -209,16 +230,17 @@ static int controls(maker *m) {
         return 0;
     }
     if (!m->setup->residual_torques) {
-        return 1;
+        return actuators(m);
     }
     if (!coordinate_block(m, "residual_torque", MHE_ROLE_CONTROL, unit, scale, &e)) {
         return 0;
     }
+    s->n_residual = s->face.n_q;
     for (int32_t i = 0; i < s->face.n_q && b != NULL && b->torque_max != NULL; i++) {
         e.lower[i] = -b->torque_max[i];
         e.upper[i] = b->torque_max[i];
     }
-    return 1;
+    return actuators(m);
 }
 
 static int inputs(maker *m) {
@@ -303,7 +325,7 @@ mhe_status mhi_layout_make(mhi_system *s, const mhi_system_setup *setup, mhe_err
     s->n_s = n_s;
     s->activation = s->muscle_layout.activation;
     s->z_state = MHI_TAKE(&s->arena, int32_t, n_s * s->face.n_m);
-    m.blocks = MHI_TAKE(&s->arena, mhe_block, 8 + n_s + s->n_forces + s->n_parameters);
+    m.blocks = MHI_TAKE(&s->arena, mhe_block, 9 + n_s + s->n_forces + s->n_parameters);
     if (s->z_state == NULL || m.blocks == NULL || !states(&m) || !controls(&m) || !inputs(&m) ||
         !parameters(&m)) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");

@@ -201,30 +201,61 @@ static mhe_status kinematics(mhi_system_context *c, const double *q, const doubl
     return c->system->model->kinematics(c->model, q, v, &out, err);
 }
 
-/* out = M^-1 (moment' + other' - tau') with the factor of M in place */
-static void acceleration_derivative(const mhi_system_context *c, const double *moment_d,
-                                    const double *other_d, const double *tau_d, double *out) {
-    const int32_t n_q = c->system->face.n_q;
-    for (int32_t i = 0; i < n_q * n_q; i++) {
-        out[i] = moment_d[i] - tau_d[i];
-    }
-    for (int32_t i = 0; i < n_q * n_q && c->system->n_forces > 0; i++) {
-        out[i] += other_d[i];
-    }
-    mhi_cholesky_solve(c->mass, n_q, out, n_q);
-}
-
-/* out [n_q x n] = -M^-1 L_q^T diag(by), column k that of the muscle `muscle[k]`, NULL: k */
-static void acceleration_by_force(const mhi_system_context *c, const double *by,
-                                  const int32_t *muscle, int32_t n, double *out) {
-    const int32_t n_q = c->system->face.n_q;
+/* moment' + other' - tau' into n_q columns of a row-major matrix of `ld`. */
+static void torque_derivative(const mhi_system_context *c, const double *moment_d,
+                              const double *other_d, const double *tau_d, double *out, int32_t ld) {
+    const int32_t n_q = c->system->face.n_q, others = c->system->n_forces > 0;
     for (int32_t i = 0; i < n_q; i++) {
-        for (int32_t k = 0; k < n; k++) {
-            const int32_t m = muscle == NULL ? k : muscle[k];
-            out[i * n + k] = -c->length_q[m * n_q + i] * by[k];
+        for (int32_t j = 0; j < n_q; j++) {
+            const double other = others ? other_d[i * n_q + j] : 0;
+            out[i * ld + j] = moment_d[i * n_q + j] - tau_d[i * n_q + j] + other;
         }
     }
-    mhi_cholesky_solve(c->mass, n_q, out, n);
+}
+
+/* M^-1 of the torques' derivatives by q and v, and M^-1 itself, in one solve with the factor of M
+ * in place: c->solved [n_q x 3 n_q]. */
+static void solve_derivatives(mhi_system_context *c) {
+    const int32_t n_q = c->system->face.n_q, ld = 3 * n_q;
+    torque_derivative(c, c->moment_q, c->other_q, c->tau_q, c->solved, ld);
+    torque_derivative(c, c->moment_v, c->other_v, c->tau_v, c->solved + n_q, ld);
+    for (int32_t i = 0; i < n_q; i++) {
+        memset(c->solved + i * ld + 2 * n_q, 0, doubles(n_q));
+        c->solved[i * ld + 2 * n_q + i] = 1;
+    }
+    mhi_cholesky_solve(c->mass, n_q, c->solved, ld);
+}
+
+/* Block of c->solved: 0 by q, 1 by v, 2 by torques. */
+static void copy_solved(const mhi_system_context *c, int32_t block, double *out) {
+    const int32_t n_q = c->system->face.n_q;
+    for (int32_t i = 0; i < n_q; i++) {
+        memcpy(out + i * n_q, c->solved + i * 3 * n_q + block * n_q, doubles(n_q));
+    }
+}
+
+/* out [n_q x n] = -M^-1 L_q^T diag(by), column k that of the muscle `muscle[k]`, NULL: k. A muscle
+ * pulls at its own coordinates only. */
+static void acceleration_by_force(mhi_system_context *c, const double *by, const int32_t *muscle,
+                                  int32_t n, double *out) {
+    const mhi_system *s = c->system;
+    const int32_t n_q = s->face.n_q;
+    const double *inverse = c->solved + 2 * n_q;
+    double *column = c->row_q;
+    for (int32_t k = 0; k < n; k++) {
+        const int32_t m = muscle == NULL ? k : muscle[k];
+        memset(column, 0, doubles(n_q));
+        for (int32_t j = s->first[m]; j < s->end[m]; j++) {
+            const double pull = -c->length_q[m * n_q + j] * by[k];
+            const double *row = inverse + j * 3 * n_q; /* symmetric */
+            for (int32_t i = 0; i < n_q && pull != 0; i++) {
+                column[i] += pull * row[i];
+            }
+        }
+        for (int32_t i = 0; i < n_q; i++) {
+            out[i * n + k] = column[i];
+        }
+    }
 }
 
 static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acceleration *out,
@@ -245,13 +276,17 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
             return status;
         }
     }
+    for (int32_t i = 0; i < n_q * n_q && s->n_actuators > 0; i++) {
+        c->tau_q[i] -= c->drive_q[i];
+    }
     muscle_derivatives(c);
+    solve_derivatives(c);
     if (out->vdot_q != NULL) {
-        acceleration_derivative(c, c->moment_q, c->other_q, c->tau_q, out->vdot_q);
+        copy_solved(c, 0, out->vdot_q);
         mhi_loops_closed(c, MHI_LOOPS_BY_Q, out->vdot_q, n_q);
     }
     if (out->vdot_v != NULL) {
-        acceleration_derivative(c, c->moment_v, c->other_v, c->tau_v, out->vdot_v);
+        copy_solved(c, 1, out->vdot_v);
         mhi_loops_closed(c, MHI_LOOPS_BY_V, out->vdot_v, n_q);
     }
     if (out->vdot_a != NULL && f->n_a > 0) {
@@ -269,8 +304,12 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
     }
     if (out->vdot_r != NULL && f->n_r > 0) {
         memset(out->vdot_r, 0, doubles(n_q * f->n_r));
-        for (int32_t i = 0; i < n_q; i++) {
+        for (int32_t i = 0; i < s->n_residual; i++) {
             out->vdot_r[i * f->n_r + i] = 1;
+        }
+        for (int32_t i = 0; i < n_q && s->n_actuators > 0; i++) {
+            memcpy(out->vdot_r + i * f->n_r + s->n_residual, c->drive_r + i * s->n_actuators,
+                   doubles(s->n_actuators));
         }
         mhi_cholesky_solve(c->mass, n_q, out->vdot_r, f->n_r);
         mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_r, f->n_r);
@@ -301,6 +340,9 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
         status = mhi_forces_evaluate(c, at, derivatives, err);
     }
+    if (status == MHE_OK && c->system->n_actuators > 0) {
+        status = mhi_actuators_drive(c, at->q, at->r + c->system->n_residual, derivatives, err);
+    }
     if (status != MHE_OK) {
         return status;
     }
@@ -308,10 +350,13 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         return mhe_fail(err, MHE_RETRY, "the mass matrix is singular at this posture");
     }
     for (int32_t i = 0; i < n_q; i++) {
-        out->vdot[i] = c->moment[i] - c->bias[i] + (face->n_r > 0 ? at->r[i] : 0.0);
+        out->vdot[i] = c->moment[i] - c->bias[i] + (c->system->n_residual > 0 ? at->r[i] : 0.0);
     }
     for (int32_t i = 0; i < n_q && c->system->n_forces > 0; i++) {
         out->vdot[i] += c->other[i];
+    }
+    for (int32_t i = 0; i < n_q && c->system->n_actuators > 0; i++) {
+        out->vdot[i] += c->drive[i];
     }
     mhi_cholesky_solve(c->mass, n_q, out->vdot, 1);
     if (c->system->n_c > 0) {

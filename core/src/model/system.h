@@ -44,6 +44,7 @@ typedef struct mhi_system_setup {
     const void *muscle_config;
     int32_t formulation;
     int32_t residual_torques; /* 0 or 1 */
+    int32_t actuators;        /* 1: the description's are controls */
     const mhi_force_setup *forces;
     int32_t n_forces;
     const mhi_bounds *bounds; /* NULL: none */

@@ -133,6 +133,10 @@ static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe
     if (status == MHE_OK) {
         status = mhi_loops_prepare(s, err);
     }
+    if (status == MHE_OK && setup->actuators) {
+        s->n_actuators = d->n_actuators;
+        status = mhi_actuators_check(s, err);
+    }
     return status == MHE_OK ? mhi_layout_make(s, setup, err) : status;
 }
 
@@ -244,6 +248,7 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                   {&c->moment, n_q},
                   {&c->moment_q, n_q * n_q},
                   {&c->moment_v, n_q * n_q},
+                  {&c->solved, 3 * n_q * n_q},
                   {&c->tau_q, n_q * n_q},
                   {&c->tau_v, n_q * n_q},
                   {&c->other, other},
@@ -275,6 +280,9 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                   {&c->all_rate_p, n_p_all * n_s},
                   {&c->force_p, s->face.n_p},
                   {&c->moment_p, n_q * s->face.n_p},
+                  {&c->drive, s->n_actuators > 0 ? n_q : 0},
+                  {&c->drive_q, s->n_actuators > 0 ? n_q * n_q : 0},
+                  {&c->drive_r, s->n_actuators * n_q},
                   {&c->gap, n_c},
                   {&c->gap_q, n_c * n_q},
                   {&c->gap_rate, n_c},

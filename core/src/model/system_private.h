@@ -41,9 +41,10 @@ struct mhi_system {
     mhi_force *forces;
     int32_t n_forces;                                        /* that do something */
     int32_t most_inputs, most_paths, most_loads, most_pairs; /* of one force */
-    int32_t n_c;                                             /* rows of the description's loops */
-    mhe_load *loop_loads; /* [n_loop_loads] what closes them acts on */
-    int32_t *loop_of;     /* [n_loop_loads] 2 loop + (0, 1) frame */
+    int32_t n_residual, n_actuators; /* controls r: residual torques, actuators */
+    int32_t n_c;                     /* rows of the description's loops */
+    mhe_load *loop_loads;            /* [n_loop_loads] what closes them acts on */
+    int32_t *loop_of;                /* [n_loop_loads] 2 loop + (0, 1) frame */
     int32_t n_loop_loads;
     mhi_arena arena;
 };
@@ -71,10 +72,13 @@ struct mhi_system_context {
     double *push, *push_d, *push_w;         /* [most_pairs x 6], [most_pairs x 6 x 6] */
     double *pair_rows, *pair_loads;         /* [most_pairs x 6 x n_q], [n_q x 36] */
     double *pair_q, *pair_work, *pair_turn; /* [n_q x n_q], [18 x n_q], [3 x n_q] */
+    double *solved;                         /* [n_q x 3 n_q] vdot by q, by v, by torques */
     double *row_q, *row_v;                  /* [n_q] */
     double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
     double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */
-    double *gap, *gap_q;              /* of the loops: [n_c], [n_c x n_q] */
+    double *drive, *drive_q,
+        *drive_r;        /* of the actuators: [n_q], [n_q x n_q], [n_q x n_actuators] */
+    double *gap, *gap_q; /* of the loops: [n_c], [n_c x n_q] */
     double *gap_rate, *gap_rate_q, *gap_rate_v;
     double *gap_acceleration, *gap_acceleration_q, *gap_acceleration_v;
     double *loop_force, *loop_push;   /* [n_c], M^-1 G^T [n_q x n_c] */
@@ -110,6 +114,12 @@ void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, doub
                                  double force_l, double force_w, double *force_q, double *force_v,
                                  double *moment_q, double *moment_v);
 
+/* actuators.c: generalised force of the description's actuators at controls r [n_actuators], into
+ * c->drive, with derivatives drive_q, drive_r. */
+mhe_status mhi_actuators_check(const mhi_system *s, mhe_error *err);
+mhe_status mhi_actuators_drive(mhi_system_context *c, const double *q, const double *r,
+                               int32_t derivatives, mhe_error *err);
+
 /* pairs.c, of one force plugin's pair i: how its frames stand, into the context; after the plugin's
  * evaluate(): adds what it pushes there to c->other and its derivatives. */
 mhe_status mhi_pairs_place(mhi_system_context *c, const mhe_frame_pair *pair, const double *v,
@@ -134,6 +144,12 @@ void mhi_loops_closed(const mhi_system_context *c, int32_t by, double *columns, 
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
  * in other_q, other_v. Needs the kinematics of `at` in the context. */
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
+/* Tensions of the force plugins' paths, added to `tension` [n_paths], and each plugin's loads.
+ * Needs the kinematics of `at` in the context. */
+typedef mhe_status mhi_force_loads(void *data, const mhe_load *loads, int32_t n,
+                                   const double *values, mhe_error *err);
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
+                           mhi_force_loads *loads, void *data, mhe_error *err);
 /* Each is finite at the model's default posture; once the system is whole. */
 mhe_status mhi_forces_check(mhi_system *s, mhe_error *err);
 void mhi_forces_destroy(mhi_system *s);

@@ -31,11 +31,35 @@ const char *const *mhi_ocp_entry_names(const mhe_problem *problem, int32_t signa
                : ocp->entry_names[signal];
 }
 
-/* Full square block [n x n] from the lower triangle of rows of length n_z. */
-static void mirror(const double *lower, int32_t n_z, int32_t n, double *block) {
+/* Full square block [n x n] of the variables from `first` on, from the lower triangle. */
+static void mirror(const mhi_ocp *ocp, const double *hessian, int32_t n_z, int32_t first, int32_t n,
+                   double *block) {
+    memset(block, 0, sizeof(double) * (size_t)(n * n));
     for (int32_t i = 0; i < n; i++) {
-        for (int32_t j = 0; j <= i; j++) {
-            block[i * n + j] = block[j * n + i] = lower[i * n_z + j];
+        const double *row = hessian + (first + i) * n_z + first;
+        const int32_t reach = ocp->reach[first + i] - first;
+        for (int32_t j = reach > 0 ? reach : 0; j <= i; j++) {
+            block[i * n + j] = block[j * n + i] = row[j];
+        }
+    }
+}
+
+/* Where anything can stand in the lower triangle. */
+static void clear(const mhi_ocp *ocp, int32_t n_z, double *hessian) {
+    for (int32_t i = 0; i < n_z; i++) {
+        const int32_t reach = ocp->reach[i];
+        memset(hessian + i * n_z + reach, 0, sizeof(double) * (size_t)(i - reach + 1));
+    }
+}
+
+/* Rows of the variables from `first` on, columns of x. */
+static void copy_rows(const mhi_ocp *ocp, const double *hessian, int32_t n_z, int32_t first,
+                      int32_t n, double *block) {
+    const int32_t n_x = ocp->n_x;
+    memset(block, 0, sizeof(double) * (size_t)(n * n_x));
+    for (int32_t i = 0; i < n; i++) {
+        for (int32_t j = ocp->reach[first + i]; j < n_x; j++) {
+            block[i * n_x + j] = hessian[(first + i) * n_z + j];
         }
     }
 }
@@ -45,7 +69,6 @@ static void mirror(const double *lower, int32_t n_z, int32_t n, double *block) {
 static void spread(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
                    const mhe_stage_values *out) {
     const int32_t n_x = ocp->n_x, n_u = n_z > n_x ? ocp->face.n_u : 0;
-    const double *of_u = w->hessian + n_x * n_z;
     if (ocp->signals.n_carried > 0) {
         mhi_ocp_spread_carried(ocp, w, out);
     } else {
@@ -53,17 +76,17 @@ static void spread(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
             memcpy(out->grad_x, w->gradient, sizeof(double) * (size_t)n_x);
         }
         if (out->hess_xx != NULL) {
-            mirror(w->hessian, n_z, n_x, out->hess_xx);
+            mirror(ocp, w->hessian, n_z, 0, n_x, out->hess_xx);
         }
-        for (int32_t i = 0; i < n_u && out->hess_ux != NULL; i++) {
-            memcpy(out->hess_ux + i * n_x, of_u + i * n_z, sizeof(double) * (size_t)n_x);
+        if (out->hess_ux != NULL && n_u > 0) {
+            copy_rows(ocp, w->hessian, n_z, n_x, n_u, out->hess_ux);
         }
     }
     if (out->grad_u != NULL && n_u > 0) {
         memcpy(out->grad_u, w->gradient + n_x, sizeof(double) * (size_t)n_u);
     }
     if (out->hess_uu != NULL && n_u > 0) {
-        mirror(of_u + n_x, n_z, n_u, out->hess_uu);
+        mirror(ocp, w->hessian, n_z, n_x, n_u, out->hess_uu);
     }
 }
 
@@ -100,7 +123,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
         sum.gradient = w->gradient;
         sum.hessian = w->hessian;
         memset(w->gradient, 0, sizeof(double) * (size_t)n_z);
-        memset(w->hessian, 0, sizeof(double) * (size_t)(n_z * n_z));
+        clear(ocp, n_z, w->hessian);
     }
     const mhe_stage stage = {.size = sizeof stage,
                              .node = k,
@@ -111,7 +134,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     const double *before = k == 0 ? NULL : targets - ocp->signals.n_y;
     for (int32_t i = 0; i < ocp->n_terms && status == MHE_OK; i++) {
         status = mhi_term_add(&ocp->terms[i], &w->terms[i], &ocp->signals, &stage, w->y, targets,
-                              before, w->jacobian, scale, n_z, &sum, err);
+                              before, ocp->spread, w->jacobian, scale, n_z, &sum, err);
     }
     if (status != MHE_OK) {
         return status;
@@ -232,6 +255,11 @@ double *mhi_ocp_u_upper(mhi_ocp *ocp, int32_t k) {
 double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k) {
     const mhi_signal *s = &ocp->signals.signal[signal];
     return s->n_y == 0 ? NULL : ocp->targets + (ptrdiff_t)k * ocp->signals.n_y + s->offset;
+}
+
+double *mhi_ocp_target_spread(mhi_ocp *ocp, int32_t signal) {
+    const mhi_signal *s = &ocp->signals.signal[signal];
+    return s->n_y == 0 ? NULL : ocp->spread + s->offset;
 }
 
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {

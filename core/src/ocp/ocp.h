@@ -60,6 +60,9 @@ double *mhi_ocp_u_upper(mhi_ocp *ocp, int32_t k);
 /* Target of a signal (MHI_SIGNAL_*) at node k: [n_y of the signal], NaN where none is known (as at
  * the start); NULL where the problem has no such signal. */
 double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
+/* Standard deviation of a signal's targets over all that was measured [n_y of the signal], NaN (as
+ * at the start): not known; told to costs. NULL where the problem has no such signal. */
+double *mhi_ocp_target_spread(mhi_ocp *ocp, int32_t signal);
 /* Inputs of the system at node k [n_w], for what comes with the frames; those from files follow the
  * time. NaN at the start. */
 double *mhi_ocp_input(mhi_ocp *ocp, int32_t k);

@@ -65,7 +65,8 @@ static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err
     uint8_t *uu = MHI_TAKE(&ocp->arena, uint8_t, n_u * n_u);
     uint8_t *zz = MHI_TAKE(&ocp->arena, uint8_t, n_z * n_z);
     uint8_t *columns = MHI_TAKE(&ocp->arena, uint8_t, n_z);
-    if (!A || !B || !xx || !ux || !uu || !zz || !columns) {
+    ocp->reach = MHI_TAKE(&ocp->arena, int32_t, n_z);
+    if (!A || !B || !xx || !ux || !uu || !zz || !columns || !ocp->reach) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     dynamics_pattern(f, n_x, A, B);
@@ -77,6 +78,9 @@ static mhe_status set_patterns(mhi_ocp *ocp, const mhe_system *f, mhe_error *err
         mhi_term_pattern(&ocp->terms[i], &ocp->signals, n_z, columns, zz);
     }
     for (int32_t a = 0; a < n_z; a++) {
+        while (ocp->reach[a] < a && !zz[a * n_z + ocp->reach[a]]) {
+            ocp->reach[a]++;
+        }
         for (int32_t b = 0; b < n_z; b++) {
             const uint8_t set = zz[a * n_z + b];
             const int32_t i = solver_column(ocp, a), j = solver_column(ocp, b);
@@ -181,6 +185,7 @@ static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
         axes = axes[i] == NULL ? NULL : axes;
     }
     const char **loops = name_loops(ocp);
+    const mhe_block *drive = mhe_layout_find(p->layout, MHE_ROLE_CONTROL, "actuator");
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         const int32_t of_muscles = i == MHI_SIGNAL_ACTIVATION || i == MHI_SIGNAL_EXCITATION ||
                                    i == MHI_SIGNAL_MUSCLE_FORCE;
@@ -188,7 +193,9 @@ static mhe_status name_entries(mhi_ocp *ocp, mhe_error *err) {
         ocp->entry_names[i] = i == MHI_SIGNAL_MARKERS ? axes
                               : of_muscles            ? p->muscle_names
                               : of_loops              ? loops
-                                                      : p->coordinate_names;
+                              : i == MHI_SIGNAL_ACTUATOR
+                                  ? (drive != NULL ? drive->entry_names : NULL)
+                                  : p->coordinate_names;
     }
     return axes == NULL || loops == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
 }
@@ -201,7 +208,7 @@ static mhe_status set_problem(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_erro
                        .n_q = d->n_coordinates,
                        .n_muscles = d->n_muscles,
                        .n_markers = d->n_markers,
-                       .n_residual_torques = mhi_system_face(setup->system)->n_r,
+                       .n_residual_torques = ocp->signals.signal[MHI_SIGNAL_RESIDUAL_TORQUE].n_y,
                        .n_intervals = setup->n_intervals,
                        .interval = setup->interval,
                        .data = ocp,
@@ -226,6 +233,7 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->u_lower = filled(&ocp->arena, n * ocp->face.n_u, -INFINITY);
     ocp->u_upper = filled(&ocp->arena, n * ocp->face.n_u, INFINITY);
     ocp->targets = filled(&ocp->arena, (n + 1) * ocp->signals.n_y, NAN);
+    ocp->spread = filled(&ocp->arena, ocp->signals.n_y, NAN);
     ocp->times = filled(&ocp->arena, n + 1, 0);
     ocp->inputs = filled(&ocp->arena, (n + 1) * ocp->n_w, NAN);
     ocp->prior_centre = filled(&ocp->arena, ocp->face.n_x, 0);
@@ -239,7 +247,8 @@ static mhe_status take_arrays(mhi_ocp *ocp, mhe_error *err) {
     ocp->face.u_upper = ocp->u_upper;
     ocp->workers = MHI_TAKE(&ocp->arena, mhi_ocp_worker, ocp->face.n_workers);
     if (!ocp->x_lower || !ocp->x_upper || !ocp->u_lower || !ocp->u_upper || !ocp->targets ||
-        !ocp->times || !ocp->inputs || !ocp->prior_centre || !ocp->prior_weight || !ocp->workers) {
+        !ocp->spread || !ocp->times || !ocp->inputs || !ocp->prior_centre || !ocp->prior_weight ||
+        !ocp->workers) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;

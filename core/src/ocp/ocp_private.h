@@ -36,9 +36,11 @@ struct mhi_ocp {
     mhi_work work;
     double *x_lower, *x_upper, *u_lower, *u_upper;
     double *targets; /* [(N+1) x n_y] */
+    double *spread;  /* [n_y] of the targets */
     double *times;   /* [N+1] */
     double *inputs;  /* [(N+1) x n_w] */
     int32_t n_w;
+    int32_t *reach; /* [n_z] first column that a row of the Hessian's lower triangle can have */
     double *prior_centre, *prior_weight; /* [n_x] */
     const char *const *entry_names[MHI_N_SIGNALS];
     double *memory;                    /* [N x memory_size] a ring, see interval_memory() */

@@ -18,6 +18,8 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     const int32_t all = driven ? f->n_x : f->n_x + n_m; /* what muscles see is contiguous in z */
     const int32_t n_r = residual != NULL ? residual->count : 0;
     const int32_t n_c = mhi_system_loop_rows(system);
+    const mhe_block *drive = mhe_layout_find(l, MHE_ROLE_CONTROL, "actuator");
+    const int32_t n_act = drive != NULL ? drive->count : 0;
     *signals = (mhi_signals){
         .signal = {
             [MHI_SIGNAL_MARKERS] = {"markers", "m", 3 * n_k, 0, 0, n_q, 0, 0, 1},
@@ -31,6 +33,8 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
             [MHI_SIGNAL_RESIDUAL_TORQUE] = {"residual_torque", "N m", n_r, 0,
                                             f->n_x + (n_r > 0 ? residual->first : 0), 0, 1, 0, 1},
             [MHI_SIGNAL_LOOP_GAP] = {"loop_gap", "m", n_c, 0, 0, n_q, 0, 0, 1},
+            [MHI_SIGNAL_ACTUATOR] = {"actuator", "1", n_act, 0,
+                                     f->n_x + (n_act > 0 ? drive->first : 0), 0, 1, 0, 1},
             [MHI_SIGNAL_LOOP_RATE] = {"loop_rate", "m/s", n_c, 0, 0, 2 * n_q, 0, 0, 1},
         }};
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {

@@ -120,14 +120,16 @@ mhe_status mhi_term_workspace_create(const mhi_term *t, int32_t n_z, mhi_arena *
     const int diagonal = t->layout.jacobian == MHE_JACOBIAN_DIAGONAL;
     w->y = MHI_TAKE(arena, double, t->ny);
     w->y_ref = MHI_TAKE(arena, double, t->ny);
+    w->y_spread = MHI_TAKE(arena, double, t->ny);
     w->r = MHI_TAKE(arena, double, n_res);
     w->r_shift = MHI_TAKE(arena, double, n_res);
     w->share = MHI_TAKE(arena, double, n_res);
     w->jacobian = MHI_TAKE(arena, double, diagonal ? t->ny : n_res * t->ny);
     w->row = MHI_TAKE(arena, double, n_z);
     w->scratch = mhi_arena_take(arena, t->layout.scratch_bytes);
-    if (w->y == NULL || w->y_ref == NULL || w->r == NULL || w->r_shift == NULL ||
-        w->share == NULL || w->jacobian == NULL || w->row == NULL || w->scratch == NULL) {
+    if (w->y == NULL || w->y_ref == NULL || w->y_spread == NULL || w->r == NULL ||
+        w->r_shift == NULL || w->share == NULL || w->jacobian == NULL || w->row == NULL ||
+        w->scratch == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     return MHE_OK;
@@ -207,6 +209,9 @@ static void add_row(const double *row, int32_t first, int32_t n, double r, doubl
     for (int32_t a = 0; a < n; a++) {
         const double scaled = scale * row[a];
         double *hessian = sum->hessian + (first + a) * n_z + first;
+        if (scaled == 0) { /* a marker moves with few coordinates */
+            continue;
+        }
         sum->gradient[first + a] += scaled * r;
         for (int32_t b = 0; b <= a; b++) {
             hessian[b] += scaled * row[b];
@@ -368,11 +373,12 @@ static mhe_status evaluate_jacobian(const mhi_term *t, mhi_term_workspace *w, mh
 
 mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
                         const mhe_stage *node, const double *y, const double *target,
-                        const double *before, const double *jacobian, double scale, int32_t n_z,
-                        mhi_term_sum *sum, mhe_error *err) {
+                        const double *before, const double *spread, const double *jacobian,
+                        double scale, int32_t n_z, mhi_term_sum *sum, mhe_error *err) {
     for (int32_t j = 0; j < t->ny; j++) {
         w->y[j] = y[t->y_index[j]];
         w->y_ref[j] = target[t->y_target[j]];
+        w->y_spread[j] = spread[t->y_target[j]];
     }
     if (t->elsewhere) {
         gather_elsewhere(t, w, node->node, before);
@@ -382,6 +388,7 @@ mhe_status mhi_term_add(const mhi_term *t, mhi_term_workspace *w, const mhi_sign
     stage.y = w->y;
     stage.y_ref = w->y_ref;
     stage.scratch = w->scratch;
+    stage.y_spread = w->y_spread;
     mhe_status status = t->ops->residual(t->self, &stage, w->r, err);
     if (status == MHE_OK) {
         status = check_residuals(t, w, err);

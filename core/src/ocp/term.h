@@ -43,6 +43,7 @@ typedef struct mhi_term {
 /* Memory of one thread for one term. */
 typedef struct mhi_term_workspace {
     double *y, *y_ref;   /* [ny] */
+    double *y_spread;    /* [ny] */
     double *r, *r_shift; /* [n_res] */
     double *share;       /* [n_res] sqrt of a row's weight in the robust loss */
     double *jacobian;    /* [ny] or [n_res x ny] */
@@ -80,11 +81,12 @@ void mhi_term_pattern(const mhi_term *term, const mhi_signals *signals, int32_t 
  * squares with weight limit / |r|, without the part along r that would make it smaller:
  * iteratively reweighted least squares, positive semidefinite. `y` are all
  * signals, those of the node before behind them; `target` those of this node, `before` of the one
- * before (NULL: there is none), `jacobian` as from mhi_signals_evaluate. Rows that are NaN because
- * data or signals are missing drop out. [hot] */
+ * before (NULL: there is none), `spread` of all nodes, `jacobian` as from mhi_signals_evaluate.
+ * Rows that are NaN because data or signals are missing drop out. [hot] */
 mhe_status mhi_term_add(const mhi_term *term, mhi_term_workspace *workspace,
                         const mhi_signals *signals, const mhe_stage *node, const double *y,
-                        const double *target, const double *before, const double *jacobian,
-                        double scale, int32_t n_z, mhi_term_sum *sum, mhe_error *err);
+                        const double *target, const double *before, const double *spread,
+                        const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum,
+                        mhe_error *err);
 
 #endif

@@ -112,24 +112,42 @@ typedef struct fan_string {
     double apex; /* of its middle, along the axis asked for */
 } fan_string;
 
-static void fan_string_at(const fan *f, double angle, int axis, fan_string *out) {
+/* out = a b, or a conj(b), of complex numbers */
+static void complex_multiply(const double *a, const double *b, double sign, double *out) {
+    double x = a[0] * b[0] - sign * a[1] * b[1], y = a[1] * b[0] + sign * a[0] * b[1];
+    out[0] = x;
+    out[1] = y;
+}
+
+/* `half_plane`: cosine and sine of its angle. */
+static void fan_string_at(const fan *f, const double *half_plane, int axis, fan_string *out) {
     static const double node[SAMPLES / 2] = {0.339981043584856, 0.861136311594053};
     static const double weight[SAMPLES / 2] = {0.652145154862546, 0.347854845137454};
-    double w[3], c = cos(angle), depth = f->off * c;
-    double radius = sqrt(1 - f->off * f->off + depth * depth), centre[3], b[3];
+    double w[3], centre[3], depth = f->off * half_plane[0];
+    double radius = sqrt(1 - f->off * f->off + depth * depth);
     for (int i = 0; i < 3; i++) {
-        w[i] = c * f->e[0][i] + sin(angle) * f->e[1][i];
+        w[i] = half_plane[0] * f->e[0][i] + half_plane[1] * f->e[1][i];
         centre[i] = f->p[i] + f->before * f->u[i] - depth * w[i];
     }
-    double from = hypot(f->before, depth), to = hypot(f->after, depth);
-    double start = HALF_TURN - atan2(depth, f->before) - acos(fmin(1, radius / from));
-    double end = atan2(depth, f->after) + acos(fmin(1, radius / to));
-    double middle = 0.5 * (start + end), half = 0.5 * (start - end), arc = 0;
+    /* directions from the centre as complex numbers, u + i w: of the ends, then of the contacts,
+     * which are turned towards each other by acos(radius / distance) */
+    double ends[2][2] = {{-f->before, depth}, {f->after, depth}}, at[2][2], between[2];
+    for (int e = 0; e < 2; e++) {
+        double square = ends[e][0] * ends[e][0] + depth * depth;
+        double open[2] = {radius / square, sqrt(fmax(0, square - radius * radius)) / square};
+        complex_multiply(ends[e], open, e == 0 ? -1 : 1, at[e]);
+    }
+    complex_multiply(at[0], at[1], -1, between);
+    double turn = atan2(between[1], between[0]), arc = 0;
+    double half = 0.5 * (turn < -0.5 * HALF_TURN ? turn + 2 * HALF_TURN : turn);
+    double back[2] = {cos(half), -sin(half)}, middle[2];
+    complex_multiply(at[0], back, 1, middle);
     for (int k = 0; k < SAMPLES; k++) {
-        double x = k % 2 ? node[k / 2] : -node[k / 2], rate = 0;
-        double at = middle + half * x, ac = cos(at), as = sin(at);
+        double x = half * node[k / 2], aside[2] = {cos(x), k % 2 ? sin(x) : -sin(x)}, on[2];
+        double rate = 0;
+        complex_multiply(middle, aside, 1, on);
         for (int i = 0; i < 3; i++) {
-            double v = f->size[i] * (ac * w[i] - as * f->u[i]);
+            double v = f->size[i] * (on[0] * w[i] - on[1] * f->u[i]);
             rate += v * v;
         }
         arc += weight[k / 2] * sqrt(rate);
@@ -137,14 +155,15 @@ static void fan_string_at(const fan *f, double angle, int axis, fan_string *out)
     out->arc = arc * half * radius;
     double d1 = 0, d2 = 0;
     for (int i = 0; i < 3; i++) {
-        out->a[i] = centre[i] + radius * (cos(start) * f->u[i] + sin(start) * w[i]);
-        b[i] = centre[i] + radius * (cos(end) * f->u[i] + sin(end) * w[i]);
-        d1 += pow(f->size[i] * (out->a[i] - f->p[i]), 2);
-        d2 += pow(f->size[i] * (b[i] - f->s[i]), 2);
+        out->a[i] = centre[i] + radius * (at[0][0] * f->u[i] + at[0][1] * w[i]);
+        double b = centre[i] + radius * (at[1][0] * f->u[i] + at[1][1] * w[i]);
+        double from = f->size[i] * (out->a[i] - f->p[i]), to = f->size[i] * (b - f->s[i]);
+        d1 += from * from;
+        d2 += to * to;
     }
     out->length = sqrt(d1) + sqrt(d2) + out->arc;
     out->apex =
-        axis < 0 ? 0 : centre[axis] + radius * (cos(middle) * f->u[axis] + sin(middle) * w[axis]);
+        axis < 0 ? 0 : centre[axis] + radius * (middle[0] * f->u[axis] + middle[1] * w[axis]);
 }
 
 static int solve_from(const wrap_surface *surface, const double *p, const double *s, const fan *f,
@@ -153,7 +172,8 @@ static int solve_from(const wrap_surface *surface, const double *p, const double
     fan_string guess;
     double from[3], turn;
     contact_circle_of(f, &circle);
-    fan_string_at(f, angle, -1, &guess);
+    const double half_plane[2] = {cos(angle), sin(angle)};
+    fan_string_at(f, half_plane, -1, &guess);
     for (int i = 0; i < 3; i++) {
         from[i] = guess.a[i] - circle.centre[i];
     }
@@ -222,6 +242,11 @@ static int solve_near(const wrap_surface *surface, const double *p, const double
 
 int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
                    const wrap_string *guess, wrap_string *out) {
+    static const double half_planes[FAN][2] = {
+        {1, 0},  {0.8660254037844386, 0.5},   {0.5, 0.8660254037844386},
+        {0, 1},  {-0.5, 0.8660254037844386},  {-0.8660254037844386, 0.5},
+        {-1, 0}, {-0.8660254037844386, -0.5}, {-0.5, -0.8660254037844386},
+        {0, -1}, {0.5, -0.8660254037844386},  {0.8660254037844386, -0.5}};
     fan f;
     fan_string strings[FAN];
     int needs = fan_of(surface, p, s, &f), axis = surface->side_axis;
@@ -231,7 +256,7 @@ int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s
         return needs;
     }
     for (int k = 0; k < FAN; k++) {
-        fan_string_at(&f, k * (2 * HALF_TURN / FAN), axis, &strings[k]);
+        fan_string_at(&f, half_planes[k], axis, &strings[k]);
         allowed[k] = axis < 0 || strings[k].apex * surface->side_sign >= 0;
         any |= allowed[k];
     }

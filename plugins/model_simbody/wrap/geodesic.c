@@ -11,18 +11,18 @@
 #include <string.h>
 
 #define STATES 10
-#define LEVELS 8    /* of extrapolation: 2, 4 .. 16 substeps */
 #define FINE 1e-10  /* error of a step less one order, relative to the surface's size */
 #define COARSE 1e-5 /* likewise, while a string is far from its end */
 #define STEP 0.7    /* longest step, as an angle by the curvature where it begins */
 #define MAX_HALVINGS 12
 #define MAX_STEPS 60
 #define MAX_NEWTON 12
+#define MAX_FIRED 16 /* strings tried: there are none where that does not do */
 #define MAX_CUTS 4
 #define NEAR 1e-3    /* miss, relative to the surface's size: from here on, fine steps */
 #define LONGEST 7.0  /* sizes: no string is longer on its surface */
 #define MAX_TURN 0.5 /* rad, sizes: longest step of Newton's method */
-#define SOLVED 2e-13 /* miss, relative to the surface's size */
+#define SOLVED 1e-12 /* miss, relative to the surface's size */
 
 static void ellipsoid_shape(const double *size, const double *x, const double *t, const double *b,
                             surface_shape *out) {
@@ -78,12 +78,23 @@ void surface_shape_at(const wrap_surface *surface, const double *x, const double
 
 #define INLINED static inline __attribute__((always_inline))
 
-/* Rates of a state on the ellipsoid whose inverse squared half axes are w. */
-INLINED void ellipsoid_rate(const double *w, const double *y, double *rate) {
-    double g[3] = {y[0] * w[0], y[1] * w[1], y[2] * w[2]};
-    double inverse = 1 / (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
-    double bend = (y[3] * y[3] * w[0] + y[4] * y[4] * w[1] + y[5] * y[5] * w[2]) * inverse;
-    double gauss = w[0] * w[1] * w[2] * inverse * inverse;
+/* Four levels of the extrapolation at a time, one in each lane. */
+#define LANES 4
+typedef double lanes __attribute__((vector_size(LANES * sizeof(double))));
+
+/* (a function that took or gave vectors by value would have another calling convention with AVX) */
+INLINED void lanes_root(lanes *x) {
+    for (int i = 0; i < LANES; i++) {
+        (*x)[i] = sqrt((*x)[i]);
+    }
+}
+
+/* Rates of states on the ellipsoid whose inverse squared half axes are w. */
+INLINED void ellipsoid_rate(const double *w, const lanes *y, lanes *rate) {
+    lanes g[3] = {y[0] * w[0], y[1] * w[1], y[2] * w[2]};
+    lanes inverse = 1 / (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    lanes bend = (y[3] * y[3] * w[0] + y[4] * y[4] * w[1] + y[5] * y[5] * w[2]) * inverse;
+    lanes gauss = w[0] * w[1] * w[2] * inverse * inverse;
     for (int i = 0; i < 3; i++) {
         rate[i] = y[3 + i];
         rate[3 + i] = -bend * g[i];
@@ -95,12 +106,14 @@ INLINED void ellipsoid_rate(const double *w, const double *y, double *rate) {
 }
 
 /* On the torus; w: curvature of the tube, radius of the ring. */
-INLINED void torus_rate(const double *w, const double *y, double *rate) {
-    double inverse = 1 / sqrt(y[0] * y[0] + y[1] * y[1]), e[2] = {y[0] * inverse, y[1] * inverse};
-    double out = 1 - w[1] * inverse; /* share of the distance from the axis */
-    double around = out * w[0], turn = e[0] * y[4] - e[1] * y[3];
-    double bend = w[0] + (around - w[0]) * turn * turn, gauss = around * w[0];
-    double k = -bend * w[0];
+INLINED void torus_rate(const double *w, const lanes *y, lanes *rate) {
+    lanes inverse = y[0] * y[0] + y[1] * y[1];
+    lanes_root(&inverse);
+    inverse = 1 / inverse;
+    lanes out = 1 - w[1] * inverse; /* share of the distance from the axis */
+    lanes around = out * w[0], turn = (y[0] * y[4] - y[1] * y[3]) * inverse;
+    lanes bend = w[0] + (around - w[0]) * turn * turn, gauss = around * w[0];
+    lanes k = -bend * w[0];
     rate[0] = y[3];
     rate[1] = y[4];
     rate[2] = y[5];
@@ -113,7 +126,7 @@ INLINED void torus_rate(const double *w, const double *y, double *rate) {
     rate[9] = -gauss * y[8];
 }
 
-INLINED void geodesic_rate(int torus, const double *w, const double *y, double *rate) {
+INLINED void geodesic_rate(int torus, const double *w, const lanes *y, lanes *rate) {
     if (torus) {
         torus_rate(w, y, rate);
     } else {
@@ -121,66 +134,81 @@ INLINED void geodesic_rate(int torus, const double *w, const double *y, double *
     }
 }
 
-/* One step of the midpoint rule in n substeps, without the last smoothing. */
-INLINED void midpoint_step(int torus, const double *w, const double *y, double h, int n,
-                           double *out) {
-    double last[STATES], rate[STATES], sub = h / n, at[STATES];
-    geodesic_rate(torus, w, y, rate);
-    for (int i = 0; i < STATES; i++) {
-        last[i] = y[i];
-        at[i] = y[i] + sub * rate[i];
+/* A step by the midpoint rule in 2, 4, 6, 8 (and, `block` 1, 10 .. 16) substeps, without the last
+ * smoothing; ends [STATES x LANES]. */
+INLINED void midpoint_step(int torus, const double *w, const double *y, double h, int block,
+                           lanes *ends) {
+    lanes last[STATES], at[STATES], rate[STATES], sub;
+    for (int l = 0; l < LANES; l++) {
+        sub[l] = h / (2 * (l + 1 + block * LANES));
     }
-    for (int k = 1; k < n; k++) {
+    for (int i = 0; i < STATES; i++) {
+        last[i] = y[i] - (lanes){0};
+    }
+    geodesic_rate(torus, w, last, rate);
+    for (int i = 0; i < STATES; i++) {
+        at[i] = last[i] + sub * rate[i];
+    }
+    int lane = 0;
+    for (int k = 1; lane < LANES; k++) {
         geodesic_rate(torus, w, at, rate);
         for (int i = 0; i < STATES; i++) {
-            double next = last[i] + 2 * sub * rate[i];
+            lanes next = last[i] + 2 * sub * rate[i];
             last[i] = at[i];
             at[i] = next;
         }
+        if (k + 1 == 2 * (lane + 1 + block * LANES)) { /* this lane has come to its end */
+            for (int i = 0; i < STATES; i++) {
+                ends[i][lane] = at[i][lane];
+            }
+            lane++;
+        }
     }
-    memcpy(out, at, sizeof at);
-}
-
-CLONES static void midpoint_ellipsoid(const double *w, const double *y, double h, int n,
-                                      double *out) {
-    midpoint_step(0, w, y, h, n, out);
-}
-
-CLONES static void midpoint_torus(const double *w, const double *y, double h, int n, double *out) {
-    midpoint_step(1, w, y, h, n, out);
 }
 
 /* Extrapolated step; returns its error in units of what is allowed. */
-static double geodesic_step(int torus, const double *w, const double *y, double h, double scale,
-                            double accuracy, double *out) {
-    double table[LEVELS][STATES], error = INFINITY;
-    for (int k = 0; k < LEVELS && !(error < 1); k++) {
-        if (torus) {
-            midpoint_torus(w, y, h, 2 * (k + 1), out);
-        } else {
-            midpoint_ellipsoid(w, y, h, 2 * (k + 1), out);
-        }
-        for (int m = 1; m <= k; m++) { /* table[m - 1]: of the coarser row, then of this one */
-            double ratio = (double)(k + 1) / (double)(k + 1 - m);
-            double factor = 1 / (ratio * ratio - 1);
-            for (int i = 0; i < STATES; i++) {
-                double off = out[i] - table[m - 1][i];
-                table[m - 1][i] = out[i];
-                out[i] += off * factor;
-            }
-        }
-        memcpy(table[k], out, sizeof table[k]);
-        if (k < 1) {
-            continue;
-        }
+INLINED double geodesic_step(int torus, const double *w, const double *y, double h, double scale,
+                             double accuracy, double *out) {
+    /* Richardson's weights for n_j = 1 .. 4 (or 8) pairs of substeps: product of
+     * n_j^2 / (n_j^2 - n_i^2) over all others; and without the first */
+    static const double whole[2][2 * LANES] = {
+        {-0.002777777777777778, 0.35555555555555557, -2.6035714285714286, 3.250793650793651, 0, 0,
+         0, 0},
+        {-1.0935444136502338e-09, 5.01665686850872e-05, -0.01797351866883117, 0.747208237578608,
+         -8.168052081716723, 32.36023405166262, -50.82753227078777, 26.90606541645695}};
+    static const double less[2][2 * LANES] = {
+        {0, 0.26666666666666666, -2.3142857142857145, 3.0476190476190474, 0, 0, 0, 0},
+        {0, 3.76249265138154e-05, -0.01597646103896104, 0.700507722729945, -7.841329998448054,
+         31.46133866133866, -49.79023569383292, 26.485658144324812}};
+    lanes ends[2][STATES];
+    double error = INFINITY;
+    for (int block = 0; block < 2 && !(error < 1); block++) {
+        midpoint_step(torus, w, y, h, block, ends[block]);
         error = 0;
-        for (int i = 0; i < 6; i++) {
-            double off = fabs(out[i] - table[k - 1][i]) / (i < 3 ? scale : 1);
+        for (int i = 0; i < STATES; i++) {
+            double best = 0, other = 0;
+            for (int l = 0; l < LANES * (block + 1); l++) {
+                double end = ends[l / LANES][i][l % LANES];
+                best += whole[block][l] * end;
+                other += less[block][l] * end;
+            }
+            out[i] = best;
+            double off = i < 6 ? fabs(best - other) / (i < 3 ? scale : 1) : 0;
             error = off > error || isnan(off) ? off : error;
         }
         error /= accuracy;
     }
     return error;
+}
+
+CLONES static double step_ellipsoid(const double *w, const double *y, double h, double scale,
+                                    double accuracy, double *out) {
+    return geodesic_step(0, w, y, h, scale, accuracy, out);
+}
+
+CLONES static double step_torus(const double *w, const double *y, double h, double scale,
+                                double accuracy, double *out) {
+    return geodesic_step(1, w, y, h, scale, accuracy, out);
 }
 
 /* What lengths on the surface are compared with: the tube of a torus, else the longest half axis.
@@ -201,7 +229,7 @@ void geodesic_follow(const wrap_surface *surface, const double *x, const double 
         w[i] = 1 / (surface->size[i] * surface->size[i]);
     }
     for (int step = 0; step < MAX_STEPS && left != 0; step++) {
-        double next[STATES];
+        double next[STATES] = {0};
         surface_shape shape;
         surface_shape_at(surface, y, y + 3, NULL, &shape);
         double curvature = fmax(fabs(shape.bend), sqrt(fabs(shape.gauss)));
@@ -210,7 +238,9 @@ void geodesic_follow(const wrap_surface *surface, const double *x, const double 
             h = copysign(longest, left);
         }
         for (int k = 0; k < MAX_HALVINGS; k++, h /= 2) {
-            if (geodesic_step(torus, w, y, h, scale, accuracy, next) < 1) {
+            double error = torus ? step_torus(w, y, h, scale, accuracy, next)
+                                 : step_ellipsoid(w, y, h, scale, accuracy, next);
+            if (error < 1) {
                 break;
             }
         }
@@ -305,27 +335,28 @@ int string_shoot(const wrap_surface *surface, const double *p, const double *s,
     double scale = surface_scale(surface), limit = SOLVED * scale;
     double arc = start->arc, accuracy = start->near ? FINE : COARSE, step[2];
     shot now;
+    int fired = 0;
     *turn = start->turn;
     if (string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now) != 0) {
         return -1;
     }
     double miss = hypot(now.miss[0], now.miss[1]);
     for (int k = 0; k < MAX_NEWTON; k++) {
-        if (accuracy > FINE && miss < NEAR * scale) {
-            accuracy = FINE;
-            (void)string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now);
-            miss = hypot(now.miss[0], now.miss[1]);
-        }
         int done = accuracy == FINE && miss < limit, better = done;
+        int finer = accuracy > FINE && miss < NEAR * scale; /* from the next one on */
+        accuracy = finer ? FINE : accuracy;
         double share = newton_step(&now, scale, step), before = miss;
         int whole = share == 1;
         for (int half = 0; half < MAX_CUTS && !better; half++, share /= 2) {
+            if (++fired > MAX_FIRED) {
+                return -1;
+            }
             if (string_fire(surface, p, s, start, *turn + share * step[0], arc + share * step[1],
                             accuracy, out, &now) != 0) {
                 continue;
             }
             miss = hypot(now.miss[0], now.miss[1]);
-            better = miss < before || (half == 0 && !whole);
+            better = miss < before || (half == 0 && (!whole || finer));
             if (better) {
                 *turn += share * step[0];
                 arc += share * step[1];

@@ -8,9 +8,11 @@
 #include <string.h>
 
 #define RETRIES 5
+#define CLEAR 0.99     /* of the tube's radius: what straight parts may come near its middle */
 #define RETRY_TURN 0.3 /* rad */
 #define AROUND 16      /* places looked at for where to begin */
 #define FULL_TURN 6.283185307179586
+#define LEAST_ANGLE (0.4 * FULL_TURN)
 
 /* Points where lines from p are tangent to the tube, by the angle about the axis. */
 typedef struct contact_curve {
@@ -18,24 +20,33 @@ typedef struct contact_curve {
     double sense; /* -1: the string goes on from there by growing angles of the tube */
 } contact_curve;
 
+/* The tangent from p to the section of the tube whose middle is `along` farther out than p:
+ * cosine and sine of the tube's angle where it touches. along cos v + up sin v = -tube, since (a -
+ * p) . n = 0. */
+static void section_contact(const contact_curve *c, double along, double *v) {
+    double up = -c->p[2], inverse = 1 / sqrt(along * along + up * up);
+    double ratio = fmax(-1, fmin(1, -c->tube * inverse));
+    double open = c->sense * sqrt(1 - ratio * ratio);
+    v[0] = inverse * (along * ratio - up * open);
+    v[1] = inverse * (up * ratio + along * open);
+}
+
 static void curve_contact(const void *data, double turn, double *a, double *a_turn) {
     const contact_curve *c = data;
-    double e[2] = {cos(turn), sin(turn)};
-    double along = c->ring - (c->p[0] * e[0] + c->p[1] * e[1]); /* (a - p) . n = 0: */
-    double up = -c->p[2], size = hypot(along, up);              /* along cos v + up sin v = -tube */
-    double ratio = fmax(-1, fmin(1, -c->tube / size)), open = acos(ratio);
-    double v = atan2(up, along) + c->sense * open;
-    double rho = c->ring + c->tube * cos(v);
+    double e[2] = {cos(turn), sin(turn)}, v[2];
+    double along = c->ring - (c->p[0] * e[0] + c->p[1] * e[1]);
+    section_contact(c, along, v);
+    double rho = c->ring + c->tube * v[0];
     a[0] = rho * e[0];
     a[1] = rho * e[1];
-    a[2] = c->tube * sin(v);
+    a[2] = c->tube * v[1];
     /* v along the curve: (up cos v - along sin v) dv + along' cos v = 0 */
     double along_turn = c->p[0] * e[1] - c->p[1] * e[0];
-    double v_turn = -along_turn * cos(v) / (up * cos(v) - along * sin(v));
-    double out = -c->tube * sin(v) * v_turn;
+    double v_turn = -along_turn * v[0] / (-c->p[2] * v[0] - along * v[1]);
+    double out = -c->tube * v[1] * v_turn;
     a_turn[0] = -rho * e[1] + out * e[0];
     a_turn[1] = rho * e[0] + out * e[1];
-    a_turn[2] = c->tube * cos(v) * v_turn;
+    a_turn[2] = c->tube * v[0] * v_turn;
 }
 
 /* Squared distance of a point of the line from the ring, or rather from the circle in the tube. */
@@ -74,24 +85,29 @@ typedef struct meridian {
     double growing; /* 1 or -1: whether the tube's angle grows along the string */
 } meridian;
 
-/* Length of the string from p over the meridian at `turn` to s (its legs need not be in the plane);
- * *arc is its part on the tube. */
-static double meridian_length(const meridian *m, double turn, double *arc) {
-    double a[3], b[3], unused[3], length = 0, v[2];
-    curve_contact(&m->from, turn, a, unused);
-    curve_contact(&m->to, turn, b, unused);
-    v[0] = atan2(a[2], hypot(a[0], a[1]) - m->from.ring);
-    v[1] = atan2(b[2], hypot(b[0], b[1]) - m->from.ring);
-    double angle = m->growing * (v[1] - v[0]);
-    /* off a meridian that the string does not touch, the angle is less than none */
-    angle -= FULL_TURN * floor(angle / FULL_TURN + 0.4);
+/* Length of the string from p over the meridian in direction e to s (its legs need not be in the
+ * plane); *arc is its part on the tube. */
+static double meridian_length(const meridian *m, const double *e, double *arc) {
+    const contact_curve *curves[2] = {&m->from, &m->to};
+    double length = 0, v[2][2];
     for (int end = 0; end < 2; end++) {
-        const double *x = end ? b : a, *other = end ? m->to.p : m->from.p;
-        double w[3] = {x[0] - other[0], x[1] - other[1], x[2] - other[2]};
+        const contact_curve *c = curves[end];
+        section_contact(c, c->ring - (c->p[0] * e[0] + c->p[1] * e[1]), v[end]);
+        double rho = c->ring + c->tube * v[end][0];
+        double w[3] = {rho * e[0] - c->p[0], rho * e[1] - c->p[1], c->tube * v[end][1] - c->p[2]};
         length += sqrt(dot3(w, w));
     }
+    double angle = atan2(m->growing * (v[0][0] * v[1][1] - v[0][1] * v[1][0]),
+                         v[0][0] * v[1][0] + v[0][1] * v[1][1]);
+    /* off a meridian that the string does not touch, the angle is less than none */
+    angle += angle < -LEAST_ANGLE ? FULL_TURN : 0;
     *arc = m->from.tube * angle;
     return length + *arc;
+}
+
+static double meridian_at(const meridian *m, double turn, double *arc) {
+    double e[2] = {cos(turn), sin(turn)};
+    return meridian_length(m, e, arc);
 }
 
 /* Where about the axis the string touches, of AROUND meridians: where it is shortest among those
@@ -121,11 +137,16 @@ static int contact_meridian(const double *length, const double *on) {
 }
 
 static double contact_guess(const wrap_surface *surface, const meridian *m, double *arc) {
+    static const double cosine[AROUND] = {
+        1,  0.9238795325112867,  0.7071067811865476,  0.3826834323650898,
+        0,  -0.3826834323650898, -0.7071067811865476, -0.9238795325112867,
+        -1, -0.9238795325112867, -0.7071067811865476, -0.3826834323650898,
+        0,  0.3826834323650898,  0.7071067811865476,  0.9238795325112867};
     double length[AROUND], on[AROUND], width = FULL_TURN / AROUND;
     int axis = surface->side_axis;
     for (int k = 0; k < AROUND; k++) {
-        double x[2] = {cos(k * width), sin(k * width)};
-        length[k] = meridian_length(m, k * width, &on[k]);
+        double x[2] = {cosine[k], cosine[(k + 3 * AROUND / 4) % AROUND]};
+        length[k] = meridian_length(m, x, &on[k]);
         if (axis >= 0 && axis < 2 && x[axis] * surface->side_sign < 0) {
             on[k] = -INFINITY;
         }
@@ -138,7 +159,7 @@ static double contact_guess(const wrap_surface *surface, const meridian *m, doub
         width /= 4;
         double middle = best;
         for (int k = -3; k <= 3; k++) {
-            double here, value = meridian_length(m, middle + k * width, &here);
+            double here, value = meridian_at(m, middle + k * width, &here);
             if (here > 0 ? value < least : isinf(least) && here > most) {
                 least = here > 0 ? value : least;
                 most = here;
@@ -148,6 +169,14 @@ static double contact_guess(const wrap_surface *surface, const meridian *m, doub
         }
     }
     return best;
+}
+
+/* Whether the straight parts of a string pass through the tube. */
+static int string_cuts(const wrap_surface *surface, const double *p, const double *s,
+                       const wrap_string *string) {
+    double tube = surface->size[0] * CLEAR, ring = surface->size[1];
+    return ring_nearest(ring, p, string->a) < tube * tube ||
+           ring_nearest(ring, string->b, s) < tube * tube;
 }
 
 int wrap_torus(const wrap_surface *surface, const double *p, const double *s,
@@ -190,11 +219,13 @@ int wrap_torus(const wrap_surface *surface, const double *p, const double *s,
     if (string_shoot(surface, p, s, &start, &turn, out) == 0) {
         return needs;
     }
-    for (int k = 1; k < RETRIES; k++) { /* outwards from there, alternating */
-        start.turn = nearest + (k % 2 ? 1 : -1) * ((k + 1) / 2) * RETRY_TURN;
-        (void)meridian_length(&m, start.turn, &start.arc);
+    const double *near = ring_distance(ring, p, zero, 0) < ring_distance(ring, s, zero, 0) ? p : s;
+    for (int k = 0; k < RETRIES; k++) { /* beside the end that is nearer, then outwards */
+        start.turn = k == 0 ? atan2(near[1], near[0])
+                            : nearest + (k % 2 ? 1 : -1) * ((k + 1) / 2) * RETRY_TURN;
+        (void)meridian_at(&m, start.turn, &start.arc);
         if (string_shoot(surface, p, s, &start, &turn, &string) == 0 &&
-            wrap_length(&string) < shortest) {
+            wrap_length(&string) < shortest && !string_cuts(surface, p, s, &string)) {
             shortest = wrap_length(&string);
             *out = string;
         }

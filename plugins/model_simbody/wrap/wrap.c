@@ -3,6 +3,7 @@
 #include "wrap.h"
 
 #include "../vector.h"
+#include "fade.h"
 
 #include <math.h>
 #include <string.h>
@@ -204,7 +205,7 @@ static int cylinder_needs(const wrap_surface *surface, const double *p, const do
 }
 
 int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
-    double radius = surface->size[0], half = 0.5 * surface->size[1];
+    double radius = surface->size[0];
     double distance[2] = {sqrt(p[0] * p[0] + p[1] * p[1]), sqrt(s[0] * s[0] + s[1] * s[1])};
     double angle[2] = {atan2(p[1], p[0]), atan2(s[1], s[0])};
     if (distance[0] <= radius || distance[1] <= radius) {
@@ -227,9 +228,6 @@ int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
     double at[2] = {ring.start, ring.start + sense * ring.turn}, *points[2] = {out->a, out->b};
     points[0][2] = p[2] + rise * ring.straight[0] / across;
     points[1][2] = s[2] - rise * ring.straight[1] / across;
-    if (fabs(out->a[2]) > half && fabs(out->b[2]) > half) {
-        return WRAP_NONE;
-    }
     for (int k = 0; k < 2; k++) {
         double c = cos(at[k]), w = sin(at[k]);
         points[k][0] = radius * c;
@@ -246,5 +244,5 @@ int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
     out->field[0] = out->field[3] = 1;
     out->field[1] = 0;
     out->field[2] = out->arc;
-    return needs;
+    return wrap_is_off(surface, out) ? WRAP_NONE : needs;
 }

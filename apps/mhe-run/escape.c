@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "escape.h"
+
+#include <ctype.h>
+#include <string.h>
+
+void add_escaped(mhi_text *out, const char *text) {
+    for (; *text != '\0'; text++) {
+        switch (*text) {
+        case '<':
+            mhi_text_add(out, "&lt;");
+            break;
+        case '>':
+            mhi_text_add(out, "&gt;");
+            break;
+        case '&':
+            mhi_text_add(out, "&amp;");
+            break;
+        case '"':
+            mhi_text_add(out, "&quot;");
+            break;
+        default:
+            mhi_text_add(out, "%c", *text);
+        }
+    }
+}
+
+void add_escaped_path(mhi_text *out, const char *text) {
+    for (; *text != '\0'; text++) {
+        const unsigned char c = (unsigned char)*text;
+        const int plain = c < 128 && (isalnum(c) || strchr("-_.~", c) != NULL);
+        mhi_text_add(out, plain ? "%c" : "%%%02X", c);
+    }
+}

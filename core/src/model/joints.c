@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "model/joints.h"
+
+
+#include <string.h>
+
+#define SIX 6
+
+static const double one[2] = {0, 1}, zero[1] = {0};
+
+static mhe_status add_motions(const mhe_description *d, mhi_arena *arena, mhe_description *out,
+                              mhe_error *err) {
+    const int32_t n = d->n_coordinates, n_more = SIX * d->n_bodies;
+    mhe_body *bodies = MHI_TAKE(arena, mhe_body, d->n_bodies);
+    mhe_coordinate *coordinates = MHI_TAKE(arena, mhe_coordinate, n + n_more);
+    mhe_dependent *dependents = MHI_TAKE(arena, mhe_dependent, d->n_dependents);
+    if (bodies == NULL || coordinates == NULL || dependents == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    *out = *d;
+    memcpy(coordinates, d->coordinates, sizeof *coordinates * (size_t)n);
+    for (int32_t i = 0; i < n_more; i++) {
+        coordinates[n + i] = (mhe_coordinate){.name = "of a joint", .lower = -1, .upper = 1};
+    }
+    for (int32_t i = 0; i < d->n_bodies; i++) {
+        const int32_t own = d->bodies[i].n_motions;
+        mhe_motion *motions = MHI_TAKE(arena, mhe_motion, own + SIX);
+        if (motions == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+        memcpy(motions, d->bodies[i].motions, sizeof *motions * (size_t)own);
+        for (int k = 0; k < own; k++) { /* numbers of dependents move up */
+            motions[k].coordinate += motions[k].coordinate >= n ? n_more : 0;
+        }
+        for (int k = 0; k < SIX; k++) {
+            motions[own + k] =
+                (mhe_motion){.kind = k < 3 ? MHE_MOTION_TRANSLATION : MHE_MOTION_ROTATION,
+                             .coordinate = n + SIX * i + k,
+                             .function = {.origin = zero, .coef = one, .n_pieces = 1, .n_coef = 2}};
+            motions[own + k].axis[k % 3] = 1;
+        }
+        bodies[i] = d->bodies[i];
+        bodies[i].motions = motions;
+        bodies[i].n_motions = own + SIX;
+    }
+    for (int32_t i = 0; i < d->n_dependents; i++) {
+        dependents[i] = d->dependents[i];
+        dependents[i].independent += dependents[i].independent >= n ? n_more : 0;
+    }
+    out->bodies = bodies;
+    out->coordinates = coordinates;
+    out->n_coordinates = n + n_more;
+    out->dependents = dependents;
+    return MHE_OK;
+}
+
+/* Points and polynomials speak of coordinates too. */
+static mhe_status move_numbers(const mhe_description *d, mhi_arena *arena, mhe_description *out,
+                               mhe_error *err) {
+    const int32_t n = d->n_coordinates, n_more = out->n_coordinates - n;
+    mhe_path *paths = MHI_TAKE(arena, mhe_path, d->n_paths);
+    if (paths == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < d->n_paths; i++) {
+        mhe_path_point *points = MHI_TAKE(arena, mhe_path_point, d->paths[i].n_points);
+        if (points == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+        paths[i] = d->paths[i];
+        paths[i].points = points;
+        for (int32_t k = 0; k < paths[i].n_points; k++) {
+            points[k] = d->paths[i].points[k];
+            for (int j = 0; j < 3; j++) {
+                points[k].coordinate[j] += points[k].coordinate[j] >= n ? n_more : 0;
+            }
+        }
+        if (paths[i].length != NULL) {
+            mhe_polynomial *length = MHI_TAKE(arena, mhe_polynomial, 1);
+            int32_t *numbers = MHI_TAKE(arena, int32_t, d->paths[i].length->n);
+            if (length == NULL || numbers == NULL) {
+                return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+            }
+            *length = *d->paths[i].length;
+            for (int32_t k = 0; k < length->n; k++) {
+                numbers[k] = length->coordinate[k] + (length->coordinate[k] >= n ? n_more : 0);
+            }
+            length->coordinate = numbers;
+            paths[i].length = length;
+        }
+    }
+    out->paths = paths;
+    return MHE_OK;
+}
+
+mhe_status mhi_joints_open(const mhe_description *d, mhi_arena *arena, mhe_description *out,
+                           mhe_error *err) {
+    const mhe_status status = add_motions(d, arena, out, err);
+    return status == MHE_OK ? move_numbers(d, arena, out, err) : status;
+}
+
+void mhi_joints_reaction(const mhe_description *d, int32_t i, const double *poses,
+                         const double *tau, int32_t n, int32_t axes, double out[6]) {
+    const double *r = poses + (ptrdiff_t)12 * i + 3, *child = d->bodies[i].body_r;
+    const int32_t parent = d->bodies[i].parent;
+    const double *to = poses + (ptrdiff_t)12 * parent + 3; /* not of ground */
+    for (int part = 0; part < 2; part++) {
+        const double *local = tau + n + (ptrdiff_t)SIX * i + (ptrdiff_t)3 * part;
+        double *of = out + (ptrdiff_t)3 * part, ground[3];
+        for (int k = 0; k < 3; k++) { /* the frame's axes in the body: body_r' */
+            of[k] = child[k] * local[0] + child[3 + k] * local[1] + child[6 + k] * local[2];
+        }
+        if (axes == MHI_IN_CHILD) {
+            continue;
+        }
+        for (int k = 0; k < 3; k++) {
+            ground[k] = r[3 * k] * of[0] + r[3 * k + 1] * of[1] + r[3 * k + 2] * of[2];
+        }
+        memcpy(of, ground, sizeof ground);
+        for (int k = 0; k < 3 && axes == MHI_IN_PARENT && parent >= 0; k++) {
+            of[k] = to[k] * ground[0] + to[3 + k] * ground[1] + to[6 + k] * ground[2];
+        }
+    }
+}

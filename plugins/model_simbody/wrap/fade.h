@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* fade.h: strings that let go of their obstacle.
+ *
+ * A string stops wrapping where one of its ends enters the obstacle, and where it slips over the
+ * end of a cylinder. It is longer than the straight line there, by E; so that no length jumps, this
+ * excess fades first. With S a polynomial that rises from 0 to 1 with two vanishing derivatives at
+ * both (its arguments are cut to 0 .. 1),
+ *     an end that moves, h outside the surface:    E S(h / (k E))
+ *     both contacts beyond the cylinder's end,
+ *     by x and y, its radius r:                    E (1 - S(x / (m r)) S(y / (m r)))
+ * so that what ends inside fades the faster the less it is; the slope does not exceed 15 / (8 k).
+ * An end that stays where it is on the obstacle's body never comes in, and fades nothing. */
+#ifndef SIMBODY_FADE_H
+#define SIMBODY_FADE_H
+
+#include "wrap.h"
+
+#define FADE_INSIDE 0.25 /* k */
+#define FADE_OFF 0.25    /* m */
+
+/* Whether a string between p and s, in the obstacle's frame, is fading; `moves`: of either end. */
+int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
+               const wrap_string *string);
+
+/* The length of one that is, with gradient g [6] and second derivatives by p and s; both NULL: not
+ * wanted. */
+double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
+                  const wrap_string *string, double *g, double *pp, double *ps, double *ss);
+
+/* Whether anything is left of a string over a cylinder. */
+int wrap_is_off(const wrap_surface *surface, const wrap_string *string);
+
+#endif

@@ -1,0 +1,236 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* active.c: a program by a primal-dual active set (a semismooth Newton method: Hintermueller, Ito
+ * and Kunisch 2002, doi:10.1137/S1052623401383558).
+ *
+ * With a guess of which bounds hold, the program is one Newton system. Its solution says which of
+ * them pull the wrong way and which others are crossed; that is the next guess, and where nothing
+ * changes it is the solution. From one window to the next few bounds change, so two or three
+ * systems do where an interior point takes five or more. It need not end: then the interior point
+ * solves the program from the same start.
+ *
+ * Controls at a bound are constants. States at one are held by a weight ACTIVE_HOLD on the distance
+ * beside their multiplier, so bounds that contradict each other do not break the recursion. Bounds
+ * of states come in only where they are crossed: of an activation that fades to 0 and its
+ * excitation at 0 one says what the other does, and guessing both makes the sets cycle. */
+#include "active.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MOST_SETS 8
+#define MOST_CORRECTIONS 3
+
+/* What lies in the way of a look at all variables. */
+typedef struct look {
+    int32_t changes;
+    double stationarity, feasibility; /* largest */
+} look;
+
+static int32_t is_state(const qp_shape *s, int32_t i) {
+    return i >= s->n_u;
+}
+
+static int32_t first_of(const qp_shape *s, int32_t k) {
+    return k < s->N ? 0 : s->n_u;
+}
+
+/* The multipliers z_lower - z_upper stand in q->rhs while sets change. */
+static void guess(qp *q) {
+    const qp_shape *s = q->shape;
+    for (int32_t k = 0; k <= s->N; k++) {
+        for (int32_t i = first_of(s, k); i < s->n_z; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const double below = q->z_lower[at], above = q->z_upper[at];
+            q->side[at] = 0;
+            if (q->fixed[at]) {
+                continue;
+            }
+            if (active_is_equality(q, at)) {
+                q->side[at] = -1;
+            } else if (below > above && below > q->w[at] - q->lower[at]) {
+                q->side[at] = -1;
+            } else if (above > below && above > q->upper[at] - q->w[at]) {
+                q->side[at] = 1;
+            }
+            q->rhs[at] = q->side[at] == 0 ? 0 : below - above;
+        }
+    }
+}
+
+/* Where the program starts from: what is constant, all else 0; -> q->w. */
+static void set_constants(qp *q) {
+    const qp_shape *s = q->shape;
+    for (int32_t k = 0; k <= s->N; k++) {
+        for (int32_t i = 0; i < s->n_z; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            q->held[at] = q->fixed[at] || (!is_state(s, i) && q->side[at] != 0);
+            q->w[at] = q->fixed[at] ? q->lower[at] : q->held[at] ? active_bound(q, at) : 0;
+        }
+    }
+}
+
+/* The system of the present set, solved from w with multipliers `lambda` of 0. */
+static int32_t solve_set(qp *q, double regularisation) {
+    const qp_shape *s = q->shape;
+    set_constants(q);
+    memset(q->lambda, 0, sizeof(double) * size_x(s));
+    qp_slope(s, q->stages, q->w, q->lambda, q->slope);
+    qp_gaps(s, q->stages, q->w, q->gap);
+    for (int32_t k = 0; k <= s->N; k++) {
+        for (int32_t i = 0; i < s->n_z; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const int32_t stiff = is_state(s, i) && q->side[at] != 0;
+            q->diagonal[at] = regularisation + (stiff ? ACTIVE_HOLD : 0);
+            q->slope[at] -= stiff ? ACTIVE_HOLD * (active_bound(q, at) - q->w[at]) + q->rhs[at] : 0;
+        }
+    }
+    if (!qp_factor(q, q->held)) {
+        return 0;
+    }
+    qp_newton(q, q->slope, q->gap, q->dw, q->dlambda);
+    for (size_t i = 0; i < size_z(s); i++) {
+        q->w[i] += q->held[i] ? 0 : q->dw[i];
+    }
+    memcpy(q->lambda, q->dlambda, sizeof(double) * size_x(s));
+    return 1;
+}
+
+/* Residuals at the present point and set, and the set that follows from them. */
+static look see(qp *q, const qp_limits *limits) {
+    const qp_shape *s = q->shape;
+    const double crossed = 0.5 * limits->feasibility, pulled = 0.5 * limits->stationarity;
+    const int32_t simple = s->n_u + s->n_dense, m = s->in_order ? s->n_x - s->n_dense : 0;
+    const int32_t first_control = m > 0 ? s->control_of[s->n_dense] : 0;
+    look l = {0};
+    memset(q->turned, 0, (size_t)s->n_x);
+    qp_slope(s, q->stages, q->w, q->lambda, q->slope);
+    qp_gaps(s, q->stages, q->w, q->gap);
+    for (size_t i = 0; i < size_x(s); i++) {
+        l.feasibility = fmax(l.feasibility, fabs(q->gap[i]));
+    }
+    for (int32_t k = 0; k <= s->N; k++) {
+        for (int32_t i = first_of(s, k); i < s->n_z; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const double y = q->slope[at];
+            if (q->fixed[at]) {
+                continue;
+            }
+            if (q->side[at] == 0) {
+                l.stationarity = fmax(l.stationarity, fabs(y));
+            } else {
+                l.feasibility = fmax(l.feasibility, fabs(q->w[at] - active_bound(q, at)));
+            }
+            q->rhs[at] = q->side[at] == 0 ? 0 : y;
+            if (active_turn(q, at, q->w[at], y, crossed, pulled)) {
+                l.changes++;
+                q->rhs[at] = 0;
+                if (i >= simple) {
+                    q->turned[i - simple] = 1;
+                } else if (i >= first_control && i < first_control + m) {
+                    q->turned[i - first_control] = 1;
+                }
+            }
+        }
+    }
+    return l;
+}
+
+static void follow_chains(qp *q, const qp_limits *limits) {
+    const int32_t m = q->shape->in_order ? q->shape->n_x - q->shape->n_dense : 0;
+    for (int32_t j = 0; j < m; j++) {
+        if (q->turned[j]) {
+            active_follow(q, j, 0.5 * limits->feasibility, 0.5 * limits->stationarity);
+        }
+    }
+}
+
+/* What is left at the set's solution, by the factors that are there. */
+static void correct(qp *q) {
+    const qp_shape *s = q->shape;
+    for (int32_t k = 0; k <= s->N; k++) {
+        for (int32_t i = 0; i < s->n_z; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const int32_t stiff = is_state(s, i) && q->side[at] != 0;
+            q->slope[at] = stiff ? -ACTIVE_HOLD * (active_bound(q, at) - q->w[at]) : q->slope[at];
+        }
+    }
+    qp_newton(q, q->slope, q->gap, q->dw, q->dlambda);
+    for (size_t i = 0; i < size_z(s); i++) {
+        q->w[i] += q->held[i] ? 0 : q->dw[i];
+    }
+    for (size_t i = 0; i < size_x(s); i++) {
+        q->lambda[i] += q->dlambda[i];
+    }
+}
+
+static int32_t is_good(const look *l, const qp_limits *limits) {
+    return l->stationarity <= limits->stationarity && l->feasibility <= limits->feasibility;
+}
+
+static void finish(qp *q, const look *l) {
+    for (size_t i = 0; i < size_z(q->shape); i++) {
+        q->z_lower[i] = q->side[i] != 0 ? fmax(0, q->rhs[i]) : 0;
+        q->z_upper[i] = q->side[i] != 0 ? fmax(0, -q->rhs[i]) : 0;
+    }
+    q->stationarity = l->stationarity;
+    q->feasibility = l->feasibility;
+    q->complementarity = q->open = 0;
+}
+
+/* A motion near the present set's solution, for a program cut short: controls within their bounds,
+ * and the states that follow from them. */
+static void settle(qp *q) {
+    const qp_shape *s = q->shape;
+    for (int32_t k = 0; k < s->N; k++) {
+        double *now = row_z(s, q->w, k), *next = row_z(s, q->w, k + 1) + s->n_u;
+        const ptrdiff_t at = (ptrdiff_t)k * s->ld_z;
+        for (int32_t i = 0; i < s->n_u; i++) {
+            now[i] = fmin(fmax(now[i], q->lower[at + i]), q->upper[at + i]);
+        }
+        memcpy(next, q->stages[k].b, sizeof(double) * (size_t)s->n_x);
+        qp_forward(s, &q->stages[k], now, next);
+    }
+}
+
+int32_t active_solve(qp *q, const qp_limits *limits) {
+    const qp_shape *s = q->shape;
+    const size_t z = sizeof(double) * size_z(s), x = sizeof(double) * size_x(s);
+    memcpy(q->fix_w, q->w, z);
+    memcpy(q->fix_lambda, q->lambda, x);
+    memset(q->rhs, 0, z);
+    guess(q);
+    int32_t result = QP_LIMIT;
+    look l = {0};
+    for (q->iterations = 0; q->iterations < MOST_SETS && result == QP_LIMIT;) {
+        if (limits->is_late != NULL && limits->is_late(limits->data)) {
+            result = QP_LATE;
+            break;
+        }
+        if (!solve_set(q, limits->regularisation)) {
+            break;
+        }
+        q->iterations++;
+        l = see(q, limits);
+        follow_chains(q, limits);
+        if (!isfinite(l.stationarity + l.feasibility)) {
+            break;
+        }
+        for (int32_t i = 0; i < MOST_CORRECTIONS && l.changes == 0 && !is_good(&l, limits); i++) {
+            correct(q);
+            l = see(q, limits);
+        }
+        if (l.changes == 0) {
+            result = is_good(&l, limits) ? QP_SOLVED : -1;
+        }
+    }
+    if (result == QP_LATE && q->iterations > 0) {
+        settle(q);
+    }
+    if (result == QP_SOLVED || (result == QP_LATE && q->iterations > 0)) {
+        finish(q, &l);
+        return result;
+    }
+    memcpy(q->w, q->fix_w, z);
+    memcpy(q->lambda, q->fix_lambda, x);
+    return result == QP_LATE ? QP_LATE : QP_LIMIT;
+}

@@ -1,0 +1,408 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "kalman.h"
+
+#include <string.h>
+
+int32_t kalman_takes(const qp_shape *s) {
+    return s->separable && s->n_dense > 0 && s->n_p == 0;
+}
+
+/* ---- memory: [count] blocks of so many doubles, in the order of the struct ---- */
+
+typedef struct piece {
+    double **at;
+    size_t n;
+} piece;
+
+enum { N_PIECES = 26 };
+
+static void pieces(const qp_shape *s, kalman *f, piece *out) {
+    const size_t N = (size_t)s->N, n = (size_t)s->n_dense, n_x = (size_t)s->n_x;
+    const size_t n_z = (size_t)s->n_z, n_u = (size_t)s->n_u;
+    const size_t ld_d = (size_t)KERNEL_LD(s->n_dense), ld_x = (size_t)s->ld_x;
+    const size_t ld_w = (size_t)KERNEL_LD(s->n_dense + s->n_x), ld_z = (size_t)s->ld_z;
+    const size_t x = size_x(s), z = size_z(s);
+    const piece all[N_PIECES] = {{&f->FT, N * n_z * ld_d},
+                                 {&f->h, z},
+                                 {&f->C, N * n_x * ld_d},
+                                 {&f->U, (N + 1) * n * ld_d},
+                                 {&f->U_inverse, (N + 1) * ld_d},
+                                 {&f->W, (N + 1) * n * ld_w},
+                                 {&f->W_inverse, (N + 1) * ld_d},
+                                 {&f->D, (N + 1) * n * ld_x},
+                                 {&f->p, x + ld_x},
+                                 {&f->K, x},
+                                 {&f->closed, x},
+                                 {&f->inverse, z},
+                                 {&f->before, n_x * ld_x},
+                                 {&f->after, n_x * ld_x},
+                                 {&f->T, n_x * ld_d},
+                                 {&f->L, n * ld_d},
+                                 {&f->noise, n_u * ld_d},
+                                 {&f->s, x + ld_x},
+                                 {&f->v, z},
+                                 {&f->z, (N + 1) * ld_d},
+                                 {&f->x, (N + 1) * ld_x},
+                                 {&f->pull, ld_z},
+                                 {&f->eta, ld_x},
+                                 {&f->lambda, ld_d},
+                                 {&f->row, ld_w},
+                                 {&f->next, ld_x}};
+    memcpy(out, all, sizeof all);
+}
+
+size_t kalman_size(const qp_shape *s) {
+    piece all[N_PIECES];
+    kalman f;
+    size_t sum = 0;
+    pieces(s, &f, all);
+    for (int32_t i = 0; i < N_PIECES && kalman_takes(s); i++) {
+        sum += all[i].n;
+    }
+    return sum;
+}
+
+void kalman_place(kalman *f, const qp_shape *s, double *memory) {
+    piece all[N_PIECES];
+    *f = (kalman){.shape = s,
+                  .n = s->n_dense,
+                  .m = s->n_x - s->n_dense,
+                  .ld_d = KERNEL_LD(s->n_dense),
+                  .ld_w = KERNEL_LD(s->n_dense + s->n_x)};
+    if (!kalman_takes(s)) {
+        return;
+    }
+    pieces(s, f, all);
+    memset(memory, 0, sizeof(double) * kalman_size(s));
+    for (int32_t i = 0; i < N_PIECES; i++) {
+        *all[i].at = memory;
+        memory += all[i].n;
+    }
+}
+
+/* ---- blocks of a stage ---- */
+
+static double *FT_of(const kalman *f, int32_t k) {
+    return f->FT + (ptrdiff_t)k * f->shape->n_z * f->ld_d;
+}
+static double *C_of(const kalman *f, int32_t k) {
+    return f->C + (ptrdiff_t)k * f->shape->n_x * f->ld_d;
+}
+static double *U_of(const kalman *f, int32_t k) {
+    return f->U + (ptrdiff_t)k * f->n * f->ld_d;
+}
+static double *W_of(const kalman *f, int32_t k) {
+    return f->W + (ptrdiff_t)k * f->n * f->ld_w;
+}
+static double *D_of(const kalman *f, int32_t k) {
+    return f->D + (ptrdiff_t)k * f->n * f->shape->ld_x;
+}
+static double *of_d(const kalman *f, double *rows, int32_t k) {
+    return rows + (ptrdiff_t)k * f->ld_d;
+}
+
+/* The simple states' part of a row of x, and of their controls of a row of u. */
+static const double *simple_x(const kalman *f, const double *rows, int32_t k) {
+    return rows + (ptrdiff_t)k * f->shape->ld_x + f->n;
+}
+static ptrdiff_t first_control(const kalman *f) {
+    return f->m > 0 ? f->shape->control_of[f->n] : 0;
+}
+
+void kalman_begin(kalman *f, const qp_stage *stages) {
+    const qp_shape *s = f->shape;
+    for (int32_t k = 0; k <= s->N; k++) {
+        double *h = row_z(s, f->h, k);
+        for (int32_t i = 0; i < s->n_z; i++) {
+            h[i] = stages[k].H[(ptrdiff_t)i * (s->ld_z + 1)];
+        }
+        if (k < s->N) {
+            s->kernels->transpose(f->n, s->n_z, stages[k].F, s->ld_z, FT_of(f, k), f->ld_d);
+        }
+    }
+}
+
+/* ---- factorisation ---- */
+
+/* Takes the costs off the simple states of stage k; 0: a curvature is not positive. */
+static int32_t complete_squares(kalman *f, const qp_stage *stage, const double *diagonal,
+                                int32_t k) {
+    const qp_shape *s = f->shape;
+    const ptrdiff_t z = (ptrdiff_t)k * s->ld_z, a = s->n_u + f->n, u = first_control(f);
+    const double *h = f->h + z, *d = diagonal + z;
+    const double *alpha = stage->by_state + f->n, *beta = stage->by_control + f->n;
+    const double *p_next = simple_x(f, f->p, k + 1);
+    double *inverse = f->inverse + z, *p = f->p + (ptrdiff_t)k * s->ld_x + f->n;
+    double *K = f->K + (ptrdiff_t)k * s->ld_x + f->n;
+    double *closed = f->closed + (ptrdiff_t)k * s->ld_x + f->n;
+    int32_t positive = 1;
+    for (int32_t i = 0; i < s->n_u; i++) {
+        const double r = h[i] + d[i];
+        inverse[i] = f->held[z + i] ? 0 : 1 / r;
+        positive &= f->held[z + i] || (r > 0 && inverse[i] > 0);
+    }
+    for (int32_t j = 0; j < f->m; j++) {
+        const double r = h[u + j] + d[u + j], all = r + beta[j] * beta[j] * p_next[j];
+        const double by = f->held[z + u + j] ? 0 : 1 / all;
+        const double left = f->held[z + u + j] ? 1 : r * by;
+        inverse[u + j] = by;
+        K[j] = beta[j] * alpha[j] * p_next[j] * by;
+        closed[j] = alpha[j] * left;
+        p[j] = h[a + j] + d[a + j] + alpha[j] * alpha[j] * p_next[j] * left;
+    }
+    return positive;
+}
+
+/* Rows of F^T for the closed loop, and those of u times their covariances. */
+static void close_loop(kalman *f, int32_t k) {
+    const qp_shape *s = f->shape;
+    const double *FT = FT_of(f, k), *K = simple_x(f, f->K, k);
+    const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z;
+    const ptrdiff_t u = first_control(f);
+    double *C = C_of(f, k);
+    memcpy(C, FT + s->n_u * f->ld_d, sizeof(double) * (size_t)(s->n_x * f->ld_d));
+    for (int32_t j = 0; j < f->m; j++) {
+        double *to = C + (f->n + j) * f->ld_d;
+        const double *from = FT + (u + j) * f->ld_d, by = K[j];
+        for (int32_t i = 0; i < f->ld_d; i++) {
+            to[i] -= by * from[i];
+        }
+    }
+    for (int32_t j = 0; j < s->n_u; j++) {
+        double *to = f->noise + j * f->ld_d;
+        const double *from = FT + j * f->ld_d, by = inverse[j];
+        for (int32_t i = 0; i < f->ld_d; i++) {
+            to[i] = by * from[i];
+        }
+    }
+}
+
+/* Sigma of the next node from Sigma' of node k; that of the first is 0. */
+static void predict(kalman *f, const qp_stage *stage, int32_t k) {
+    const qp_shape *s = f->shape;
+    const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_d = f->ld_d;
+    const double *FT = FT_of(f, k), *C = C_of(f, k), *closed = simple_x(f, f->closed, k);
+    const double *beta = stage->by_control + n;
+    const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z + first_control(f);
+    const double *of_control = f->noise + first_control(f) * ld_d;
+    double *next = f->before;
+    s->kernels->product(n, n, s->n_u, 1, FT, ld_d, f->noise, ld_d, NULL, next, ld_x, 1);
+    if (k > 0) {
+        s->kernels->product(n_x, n, n_x, 1, f->after, ld_x, C, ld_d, NULL, f->T, ld_d, 0);
+        s->kernels->product(n, n, n_x, 1, C, ld_d, f->T, ld_d, next, next, ld_x, 1);
+    }
+    for (int32_t j = 0; j < f->m; j++) {
+        double *row = next + (n + j) * ld_x;
+        const double *t = f->T + (n + j) * ld_d, *e = of_control + j * ld_d;
+        const double by_t = k > 0 ? closed[j] : 0, by_e = beta[j];
+        for (int32_t i = 0; i < n; i++) {
+            row[i] = by_t * t[i] + by_e * e[i];
+        }
+        const double *old = f->after + (n + j) * ld_x + n;
+        for (int32_t i = 0; i < f->m; i++) {
+            row[n + i] = by_t * closed[i] * old[i];
+        }
+        row[n + j] += beta[j] * beta[j] * inverse[j];
+    }
+    s->kernels->transpose(f->m, n, next + n * ld_x, ld_x, next + n, ld_x);
+    s->kernels->mirror(n, next, ld_x);
+}
+
+/* Sigma' of node k from Sigma. */
+static int32_t measure(kalman *f, const qp_stage *stage, const double *diagonal, int32_t k) {
+    const qp_shape *s = f->shape;
+    const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_d = f->ld_d, ld_w = f->ld_w;
+    const int32_t last = k == s->N, width = last ? n : n_x;
+    const double *d = diagonal + (ptrdiff_t)k * s->ld_z + s->n_u;
+    double *U = U_of(f, k), *W = W_of(f, k);
+    for (int32_t i = 0; i < n; i++) {
+        const double *from = stage->H + (s->n_u + i) * s->ld_z + s->n_u;
+        memcpy(U + i * ld_d + i, from + i, sizeof(double) * (size_t)(n - i));
+        memset(U + i * ld_d, 0, sizeof(double) * (size_t)i);
+        U[i * ld_d + i] += d[i];
+    }
+    if (!s->kernels->factor(n, n, U, ld_d, of_d(f, f->U_inverse, k))) {
+        return 0;
+    }
+    for (int32_t i = 0; i < n; i++) { /* blocks of four rows write beside the diagonal */
+        for (int32_t j = i / 4 * 4; j < i; j++) {
+            U[i * ld_d + j] = 0;
+        }
+    }
+    s->kernels->transpose(n, n, U, ld_d, f->L, ld_d);
+    s->kernels->product(n, n, n, 1, f->before, ld_x, f->L, ld_d, NULL, f->T, ld_d, 0);
+    s->kernels->product(n, n, n, 1, f->T, ld_d, f->L, ld_d, NULL, W, ld_w, 1);
+    for (int32_t i = 0; i < n; i++) {
+        W[i * ld_w + i] += 1;
+    }
+    s->kernels->product(n, width, n, 1, f->L, ld_d, f->before, ld_x, NULL, W + n, ld_w, 0);
+    if (!s->kernels->factor(n, n + width, W, ld_w, of_d(f, f->W_inverse, k))) {
+        return 0;
+    }
+    double *D = D_of(f, k);
+    if (!last) {
+        s->kernels->product(n_x, n_x, n, -1, W + n, ld_w, W + n, ld_w, f->before, f->after, ld_x,
+                            1);
+        s->kernels->mirror(n_x, f->after, ld_x);
+        memcpy(D, f->after, sizeof(double) * (size_t)(n * ld_x));
+    }
+    return 1;
+}
+
+int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
+                      const uint8_t *held) {
+    const qp_shape *s = f->shape;
+    const ptrdiff_t end = (ptrdiff_t)s->N * s->ld_z + s->n_u + f->n;
+    double *p = f->p + (ptrdiff_t)s->N * s->ld_x + f->n;
+    f->held = held;
+    for (int32_t j = 0; j < f->m; j++) {
+        p[j] = f->h[end + j] + diagonal[end + j];
+    }
+    for (int32_t k = s->N - 1; k >= 0; k--) {
+        if (!complete_squares(f, &stages[k], diagonal, k)) {
+            return 0;
+        }
+    }
+    for (int32_t k = 0; k < s->N; k++) {
+        close_loop(f, k);
+        predict(f, &stages[k], k);
+        if (!measure(f, &stages[k + 1], diagonal, k + 1)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* ---- solution ---- */
+
+/* Slopes of the costs to go of simple states -> s, and what controls do without any pull -> v. */
+static void sweep_simple(kalman *f, const qp_stage *stages, const double *g, const double *b) {
+    const qp_shape *s = f->shape;
+    const ptrdiff_t u = first_control(f), a = s->n_u + f->n;
+    for (int32_t k = s->N; k >= 0; k--) {
+        const double *slope = g + (ptrdiff_t)k * s->ld_z;
+        double *to_go = f->s + (ptrdiff_t)k * s->ld_x + f->n;
+        if (k == s->N) {
+            memcpy(to_go, slope + a, sizeof(double) * (size_t)f->m);
+            continue;
+        }
+        const double *alpha = stages[k].by_state + f->n, *beta = stages[k].by_control + f->n;
+        const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z, *K = simple_x(f, f->K, k);
+        const double *p_next = simple_x(f, f->p, k + 1), *s_next = simple_x(f, f->s, k + 1);
+        const double *c = simple_x(f, b, k);
+        double *v = f->v + (ptrdiff_t)k * s->ld_z;
+        for (int32_t i = 0; i < s->n_u; i++) {
+            v[i] = -inverse[i] * slope[i];
+        }
+        for (int32_t j = 0; j < f->m; j++) {
+            const double t = p_next[j] * c[j] + s_next[j], e = slope[u + j] + beta[j] * t;
+            v[u + j] = -inverse[u + j] * e;
+            to_go[j] = slope[a + j] + alpha[j] * t - K[j] * e;
+        }
+    }
+}
+
+/* Means: z and what of x no pull has changed, behind each measurement. */
+static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, const double *b) {
+    const qp_shape *s = f->shape;
+    const int32_t n = f->n, ld_d = f->ld_d;
+    const ptrdiff_t u = first_control(f);
+    for (int32_t k = 0; k < s->N; k++) {
+        const double *beta = stages[k].by_control + n, *closed = simple_x(f, f->closed, k);
+        const double *v = f->v + (ptrdiff_t)k * s->ld_z, *x = f->x + (ptrdiff_t)k * s->ld_x;
+        double *y = f->row, *m = f->next, *z = of_d(f, f->z, k + 1);
+        memcpy(m, b + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)s->ld_x);
+        for (int32_t j = 0; j < f->m; j++) {
+            m[n + j] += beta[j] * v[u + j] + (k > 0 ? closed[j] * x[n + j] : 0);
+        }
+        memset(z, 0, sizeof(double) * (size_t)ld_d);
+        memcpy(z, m, sizeof(double) * (size_t)n);
+        s->kernels->add_transposed(s->n_u, n, 1, FT_of(f, k), ld_d, v, z);
+        if (k > 0) {
+            s->kernels->add_transposed(s->n_x, n, 1, C_of(f, k), ld_d, x, z);
+        }
+        memcpy(m, z, sizeof(double) * (size_t)n);
+        /* U m + U^-T g, then the factor's row of S^-1 and what it takes off m */
+        const int32_t width = k + 1 == s->N ? n : s->n_x;
+        memset(y, 0, sizeof(double) * (size_t)f->ld_w);
+        memcpy(y, g + (ptrdiff_t)(k + 1) * s->ld_z + s->n_u, sizeof(double) * (size_t)n);
+        s->kernels->substitute(n, n, U_of(f, k + 1), ld_d, of_d(f, f->U_inverse, k + 1), y);
+        s->kernels->add(n, n, 1, U_of(f, k + 1), ld_d, z, y);
+        memcpy(y + n, m, sizeof(double) * (size_t)width);
+        memset(y + n + width, 0, sizeof(double) * (size_t)(f->ld_w - n - width));
+        s->kernels->substitute(n, n + width, W_of(f, k + 1), f->ld_w, of_d(f, f->W_inverse, k + 1),
+                               y);
+        memset(z, 0, sizeof(double) * (size_t)ld_d);
+        memcpy(z, y, sizeof(double) * (size_t)n);
+        memcpy(f->x + (ptrdiff_t)(k + 1) * s->ld_x, y + n, sizeof(double) * (size_t)width);
+    }
+}
+
+/* Pulls: dense states, multipliers of the closed loop, controls of the closed loop -> v. */
+static void sweep_back(kalman *f, const qp_stage *stages, double *w, double *lambda) {
+    const qp_shape *s = f->shape;
+    const int32_t n = f->n, n_x = s->n_x, ld_d = f->ld_d;
+    const ptrdiff_t u = first_control(f);
+    memset(f->eta, 0, sizeof(double) * (size_t)s->ld_x);
+    for (int32_t k = s->N; k > 0; k--) {
+        const int32_t last = k == s->N;
+        double *x = row_z(s, w, k) + s->n_u, *y = of_d(f, f->z, k), *out = row_x(s, lambda, k - 1);
+        memcpy(x, f->x + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)n);
+        if (!last) {
+            s->kernels->add(n, n_x, 1, D_of(f, k), s->ld_x, f->eta, x);
+            s->kernels->add(n, n_x, 1, W_of(f, k) + n, f->ld_w, f->eta, y);
+        }
+        s->kernels->substitute_back(n, W_of(f, k), f->ld_w, of_d(f, f->W_inverse, k), y, f->row);
+        memset(f->lambda, 0, sizeof(double) * (size_t)ld_d);
+        memcpy(f->lambda, f->eta, sizeof(double) * (size_t)n);
+        s->kernels->add_transposed(n, n, 1, U_of(f, k), ld_d, f->row, f->lambda);
+        memcpy(out, f->eta, sizeof(double) * (size_t)s->ld_x);
+        memcpy(out, f->lambda, sizeof(double) * (size_t)n);
+        const double *beta = stages[k - 1].by_control + n, *closed = simple_x(f, f->closed, k - 1);
+        const double *inverse = f->inverse + (ptrdiff_t)(k - 1) * s->ld_z;
+        double *v = f->v + (ptrdiff_t)(k - 1) * s->ld_z;
+        memset(f->pull, 0, sizeof(double) * (size_t)s->n_u);
+        s->kernels->add(s->n_u, n, 1, FT_of(f, k - 1), ld_d, f->lambda, f->pull);
+        for (int32_t j = 0; j < f->m; j++) {
+            f->pull[u + j] += beta[j] * out[n + j];
+        }
+        for (int32_t i = 0; i < s->n_u; i++) {
+            v[i] += inverse[i] * f->pull[i];
+        }
+        for (int32_t j = 0; j < f->m; j++) {
+            f->eta[n + j] = closed[j] * out[n + j];
+        }
+        memset(f->eta, 0, sizeof(double) * (size_t)n);
+        s->kernels->add(k > 1 ? n_x : 0, n, 1, C_of(f, k - 1), ld_d, f->lambda, f->eta);
+    }
+}
+
+/* Simple states and controls, and the multipliers of the former as they are with their costs. */
+static void follow_simple(kalman *f, const qp_stage *stages, const double *b, double *w,
+                          double *lambda) {
+    const qp_shape *s = f->shape;
+    const ptrdiff_t u = first_control(f), a = s->n_u + f->n;
+    memset(row_z(s, w, 0) + s->n_u, 0, sizeof(double) * (size_t)s->n_x);
+    for (int32_t k = 0; k < s->N; k++) {
+        const double *alpha = stages[k].by_state + f->n, *beta = stages[k].by_control + f->n;
+        const double *K = simple_x(f, f->K, k), *c = simple_x(f, b, k);
+        const double *p_next = simple_x(f, f->p, k + 1), *s_next = simple_x(f, f->s, k + 1);
+        double *now = row_z(s, w, k), *next = row_z(s, w, k + 1);
+        double *multiplier = row_x(s, lambda, k) + f->n;
+        memcpy(now, f->v + (ptrdiff_t)k * s->ld_z, sizeof(double) * (size_t)s->n_u);
+        for (int32_t j = 0; j < f->m; j++) {
+            now[u + j] -= K[j] * now[a + j];
+            next[a + j] = alpha[j] * now[a + j] + beta[j] * now[u + j] + c[j];
+            multiplier[j] -= p_next[j] * next[a + j] + s_next[j];
+        }
+    }
+    memset(row_z(s, w, s->N), 0, sizeof(double) * (size_t)s->n_u);
+}
+
+void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const double *b, double *w,
+                  double *lambda) {
+    sweep_simple(f, stages, g, b);
+    sweep_forward(f, stages, g, b);
+    sweep_back(f, stages, w, lambda);
+    follow_simple(f, stages, b, w, lambda);
+}

@@ -1,0 +1,275 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe.source.qualisys against a server that speaks QTM's real-time protocol, which the official
+ * client of Qualisys reads, too: numbers, clocks, and whatever goes wrong on the way. */
+#include "qtm_server.h"
+#include "use.h"
+
+#include <math.h>
+#include <mhe/source.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+#define PATIENCE 30.0 /* s until a test gives up; nothing is judged by its speed */
+
+static double now(void) {
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+typedef struct reader {
+    const mhe_source_ops *ops;
+    void *self;
+    int32_t n_frames, n_analog, n_wrong, seen[8];
+    char text[512];
+} reader;
+
+/* What stands in a chunk is what the server's formula says of its time. */
+static void take_chunk(void *data, const mhe_chunk *chunk) {
+    reader *r = data;
+    mhe_stream_info info = {.size = sizeof info};
+    (void)r->ops->stream(r->self, chunk->stream, &info, NULL);
+    for (int32_t k = 0; k < chunk->n; k++) {
+        const double *v = chunk->values + (ptrdiff_t)k * info.n_channels;
+        if (chunk->stream == 0) {
+            const int64_t frame = llround(100 * chunk->stamp[k]);
+            for (int32_t i = 0; i < info.n_channels; i++) {
+                const double m = 1e-3 * (double)qtm_marker(frame, i / 3, i % 3);
+                r->n_wrong += isnan(m) ? !isnan(v[i]) : v[i] != m;
+            }
+            r->n_frames++;
+        } else { /* the packet's time is that of its last sample */
+            const int64_t n = llround(500 * chunk->stamp[k]) + QTM_SAMPLES - 1;
+            for (int32_t i = 0; i < info.n_channels; i++) {
+                r->n_wrong += v[i] != (double)qtm_analog(n, i);
+            }
+            r->n_analog++;
+        }
+    }
+}
+
+static void take_event(void *data, int32_t event, int32_t stream, const char *text) {
+    reader *r = data;
+    (void)stream;
+    r->seen[event & 7]++;
+    (void)snprintf(r->text, sizeof r->text, "%s", text);
+}
+
+static void begin_reader(reader *r, int32_t port, const char *more) {
+    const mhe_plugin *plugin = test_plugin("mhe.source.qualisys", MHE_SOURCE_IFACE);
+    char yaml[200];
+    mhe_error err = {0};
+    assert_non_null(plugin);
+    (void)snprintf(yaml, sizeof yaml, "{host: 127.0.0.1, port: %d%s}", (int)port, more);
+    *r = (reader){.ops = plugin->ops};
+    assert_int_equal(r->ops->create(test_host(), test_config(plugin, yaml), &r->self, &err),
+                     MHE_OK);
+}
+
+static mhe_status open_reader(reader *r, const char *said, mhe_error *err) {
+    const double until = now() + PATIENCE;
+    mhe_status status = MHE_RETRY;
+    while (status == MHE_RETRY && now() < until && (said == NULL || !strstr(err->text, said))) {
+        status = r->ops->open(r->self, now() + 0.5, err);
+    }
+    return status;
+}
+
+static void open_well(reader *r) {
+    mhe_error err = {0};
+    if (open_reader(r, NULL, &err) != MHE_OK) {
+        fail_msg("%s", err.text);
+    }
+}
+
+static void read_once(reader *r) {
+    const mhe_source_taker taker = {sizeof taker, r, take_chunk, take_event};
+    mhe_error err = {0};
+    assert_int_equal(r->ops->read(r->self, now() + 0.02, &taker, &err), MHE_OK);
+}
+
+static void read_frames(reader *r, int32_t more) {
+    const int32_t n = r->n_frames + more;
+    const double until = now() + PATIENCE;
+    while (r->n_frames < n && now() < until) {
+        read_once(r);
+    }
+    assert_true(r->n_frames >= n);
+    assert_int_equal(r->n_wrong, 0);
+}
+
+static void read_until(reader *r, int32_t event, int32_t times, const char *said) {
+    const double until = now() + PATIENCE;
+    while (r->seen[event] < times && now() < until) {
+        read_once(r);
+    }
+    if (r->seen[event] < times || strstr(r->text, said) == NULL) {
+        fail_msg("event %d: %d times, '%s' does not say '%s'", (int)event, (int)r->seen[event],
+                 r->text, said);
+    }
+}
+
+static void numbers_as_they_are(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    mhe_error err = {0};
+    mhe_stream_info info = {.size = sizeof info};
+    assert_non_null(server);
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    assert_int_equal(r.ops->count(r.self), 2);
+    assert_int_equal(r.ops->stream(r.self, 0, &info, &err), MHE_OK);
+    assert_int_equal(info.n_channels, 6);
+    assert_string_equal(info.labels[4], "B.y");
+    assert_string_equal(info.units[0], "m");
+    assert_true(info.rate == 100 && info.up == 2);
+    assert_int_equal(r.ops->stream(r.self, 1, &info, &err), MHE_OK);
+    assert_string_equal(info.labels[1], "Triceps");
+    assert_string_equal(info.name, "EMG box");
+    assert_true(info.rate == 500);
+    read_frames(&r, 200);
+    assert_true(r.n_analog >= 5 * 199);
+    assert_int_equal(r.seen[MHE_SOURCE_WARNING], 0);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+/* The official client sees the same server, at the same time. */
+static void the_official_client(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    char command[600];
+    reader r;
+    assert_non_null(server);
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    (void)snprintf(command, sizeof command, "command -v node >/dev/null || exit 77; node %s %d",
+                   MHE_TEST_SOURCE_DIR "/tests/live/qtm_client.js", (int)qtm_server_port(server));
+    const int code = system(command);
+    read_frames(&r, 20);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+    if (WEXITSTATUS(code) == 77) {
+        print_message("skipped: qualisys-rt is not installed (./bootstrap test does)\n");
+        skip();
+    }
+    assert_int_equal(code, 0);
+}
+
+static void markers_alone(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    begin_reader(&r, qtm_server_port(server), ", emg: false");
+    open_well(&r);
+    assert_int_equal(r.ops->count(r.self), 1);
+    read_frames(&r, 20);
+    assert_int_equal(r.n_analog, 0);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+static void what_is_not_there(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    const int32_t port = qtm_server_port(server);
+    reader r;
+    mhe_error err = {0};
+    begin_reader(&r, port, ", device: Nobody");
+    assert_int_equal(open_reader(&r, "no analog device 'Nobody'", &err), MHE_RETRY);
+    assert_non_null(strstr(err.text, "no analog device 'Nobody'"));
+    r.ops->destroy(r.self);
+    qtm_server_set(server, QTM_BAD_XML);
+    begin_reader(&r, port, "");
+    assert_int_equal(open_reader(&r, NULL, &err), MHE_E_INPUT);
+    assert_non_null(strstr(err.text, "no valid XML"));
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+    begin_reader(&r, port, "");
+    err.text[0] = '\0';
+    assert_int_equal(open_reader(&r, "no QTM at 127.0.0.1", &err), MHE_RETRY);
+    assert_non_null(strstr(err.text, "no QTM at 127.0.0.1"));
+    r.ops->destroy(r.self);
+}
+
+/* A fault in the middle: told, and streaming goes on when it is over. */
+static void fault(int what, int32_t event, const char *said) {
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    assert_non_null(server);
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    read_frames(&r, 10);
+    qtm_server_set(server, what);
+    read_until(&r, event, 1, said);
+    qtm_server_set(server, QTM_STREAM);
+    read_frames(&r, 10);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+static void faults(void **state) {
+    (void)state;
+    fault(QTM_CLOSE, MHE_SOURCE_LOST, "QTM has closed the connection");
+    fault(QTM_GARBAGE, MHE_SOURCE_LOST, "this is no real-time server of QTM");
+    fault(QTM_HUGE, MHE_SOURCE_LOST, "this is no real-time server of QTM");
+    fault(QTM_CUT, MHE_SOURCE_WARNING, "cut short");
+    fault(QTM_END, MHE_SOURCE_LOST, "no more data");
+    fault(QTM_LOSE, MHE_SOURCE_WARNING, "5 analog samples were lost");
+}
+
+/* The server is started anew on the same port. */
+static void started_again(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    const int32_t port = qtm_server_port(server);
+    reader r;
+    begin_reader(&r, port, "");
+    open_well(&r);
+    read_frames(&r, 10);
+    qtm_server_stop(server);
+    read_until(&r, MHE_SOURCE_LOST, 1, "closed");
+    server = qtm_server_start(port);
+    assert_non_null(server);
+    read_until(&r, MHE_SOURCE_CHANGED, 1, "QTM is back");
+    read_frames(&r, 10);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+static void other_markers(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    mhe_stream_info info = {.size = sizeof info};
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    read_frames(&r, 10);
+    qtm_server_set(server, QTM_OTHER); /* with the event that says so */
+    read_until(&r, MHE_SOURCE_CHANGED, 1, "other markers");
+    assert_int_equal(r.ops->stream(r.self, 0, &info, NULL), MHE_OK);
+    assert_string_equal(info.labels[3], "C.x");
+    read_frames(&r, 10);
+    qtm_server_set(server, QTM_FEWER); /* and without */
+    read_until(&r, MHE_SOURCE_CHANGED, 2, "other markers");
+    assert_int_equal(r.ops->stream(r.self, 0, &info, NULL), MHE_OK);
+    assert_int_equal(info.n_channels, 3);
+    read_frames(&r, 10);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(numbers_as_they_are),
+                                       cmocka_unit_test(the_official_client),
+                                       cmocka_unit_test(markers_alone),
+                                       cmocka_unit_test(what_is_not_there),
+                                       cmocka_unit_test(faults),
+                                       cmocka_unit_test(started_again),
+                                       cmocka_unit_test(other_markers)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
