@@ -209,12 +209,12 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     }
     drop_outliers(e, e->begin.distance, nearest);
     guess_rest(e);
-    mhi_pace_measure(e);
     mhi_ocp_set_begins(e->ocp, 1);
     status = mhi_ocp_carry(e->ocp, e->window.guess_x, e->window.guess_u, err);
     if (status != MHE_OK) {
         return status;
     }
+    mhi_pace_measure(e);
     memcpy(e->window.solution.x, e->window.guess_x,
            sizeof(double) * (size_t)((e->window.n + 1) * e->window.n_x));
     memcpy(e->window.solution.u, e->window.guess_u,

@@ -21,10 +21,13 @@
  * recordings take a fifth of it at most. Where the integrator needs more than PLAIN for an interval
  * (finer steps, states of muscles) it is more, up to so many times. Frames that come before a usual
  * one is known share it, and each may take SLICE of it in any case. */
-#define FIRST 60000.0
+#define FIRST 100000.0
 #define PLAIN 40.0
 #define DEARER 8.0
 #define SLICE 0.02
+/* Usual is at most this many times the least median that ever was: hard data must not raise their
+ * own limit. */
+#define DRIFT 1.5
 #define KNOWN 5 /* frames that make a usual one */
 /* Of the time to a deadline: what lies between an evaluation that ends late and the estimate. */
 #define GRACE 1.03
@@ -118,7 +121,6 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-/* Usual is the least median that ever was: hard data must not raise their own limit. */
 static void learn(mhi_pace *p, double work) {
     double sorted[MHI_PACE_FRAMES];
     p->frames[p->n_frames++ % MHI_PACE_FRAMES] = work;
@@ -127,7 +129,8 @@ static void learn(mhi_pace *p, double work) {
     qsort(sorted, (size_t)n, sizeof *sorted, by_value);
     if (n >= KNOWN) {
         const double median = sorted[n / 2];
-        p->usual = p->usual == 0 ? median : fmin(p->usual, median);
+        p->least = p->usual == 0 ? median : fmin(p->least, median);
+        p->usual = fmin(median, DRIFT * p->least);
     }
 }
 

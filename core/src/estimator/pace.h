@@ -18,6 +18,7 @@ typedef struct mhi_pace {
     double frames[MHI_PACE_FRAMES]; /* work of the last that ended as they should, a ring */
     int32_t n_frames, n_converged;  /* so far */
     double usual;                   /* 0: not known yet */
+    double least;                   /* that usual was */
     double first, all_first;        /* what is left for the frames until then, and was */
     int32_t first_told;
     int32_t settled; /* the frame in work is no beginning */
