@@ -9,8 +9,8 @@
 #include <math.h>
 #include <string.h>
 
-#define NO_LIMIT 1e6 /* s a frame, in the place of a limit of work: a truth is solved to its end \
-                      */
+/* s a frame, in the place of a limit of work: a truth is solved to its end */
+#define NO_LIMIT 1e6
 
 typedef struct follow {
     const motion_setup *setup;

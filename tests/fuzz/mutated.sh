@@ -17,7 +17,9 @@ seconds=2
 arm=$source/models/arm19
 cp "$arm/arm19.osim" model.osim
 cp "$source/tests/fuzz/corpus/biomod/arm.bioMod" model.bioMod
-cp "$arm/demo_recording.c3d" data.c3d
+sed '/^nRows/s/=.*/=30/' "$arm/demo_reference.sto" | awk '/^time/ { data = NR } !data || NR <= data + 30' > reference.sto
+"$(dirname "$run")/mhe-sim" noise "$arm/demo_recording.yaml" --set "reference=$PWD/reference.sto" --out made > made.txt 2>&1 &&
+    cp made/recording.c3d data.c3d || fail "no recording: $(cat made.txt)"
 head -n 36 "$arm/demo_markers.trc" | sed '3s/301/30/' > data.trc
 head -n 37 "$arm/demo_emg.sto" | sed 's/nRows=301/nRows=30/' > data.sto
 cat > config.yaml <<'END'
@@ -58,7 +60,6 @@ while [ $done -lt "$count" ]; do
     esac
     spoilt=spoilt.${file##*.}
     "$mutate" "$file" "$spoilt" "$seed" || fail "mutate $file $seed"
-    [ $file != data.c3d ] || set -- "$@" --set horizon.ratio=10 # three seconds long
     [ $file != model.bioMod ] || set -- angles.yaml --quiet --out out
     if [ -z "$what" ]; then
         set -- "$spoilt" --quiet --out out

@@ -18,12 +18,12 @@
 /* An interior-point step, of each interval, in units of work. */
 #define STEP 10
 /* The first window starts from far and has no frame before it: this much, of each interval; good
- * recordings take a fifth of it at most. Where the integrator needs more than PLAIN for an interval
+ * recordings take a third of it at most. Where the integrator needs more than PLAIN for an interval
  * (finer steps, states of muscles) it is more, up to so many times. Frames that come before a usual
  * one is known share it, and each may take SLICE of it in any case. */
-#define FIRST 100000.0
+#define FIRST 40000.0
 #define PLAIN 40.0
-#define DEARER 8.0
+#define DEARER 4.0
 #define SLICE 0.02
 /* Usual is at most this many times the least median that ever was: hard data must not raise their
  * own limit. */
