@@ -9,6 +9,9 @@
 #include <math.h>
 #include <string.h>
 
+/* s a frame, in the place of a limit of work: a truth is solved to its end */
+#define NO_LIMIT 1e6
+
 typedef struct follow {
     const motion_setup *setup;
     mhe_estimator *estimator;
@@ -106,6 +109,7 @@ static mhe_status follow_path(follow *f, mhe_error *err) {
     memset(s->x_next, 0, sizeof(double) * (size_t)s->n_q);
     mhi_estimator_set_start(f->estimator, f->q, s->x_next);
     mhi_estimator_set_outlier(f->estimator, 0);
+    mhi_estimator_set_deadline(f->estimator, NO_LIMIT);
     for (int32_t ahead = 0; ahead <= n + window && status == MHE_OK; ahead++) {
         const int32_t k = ahead - window; /* the window's first node */
         const double time = p->time[0] + k / s->rate;

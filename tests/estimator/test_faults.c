@@ -377,7 +377,7 @@ static void a_deadline_of_no_time(void **state) {
     (void)state;
     rig r;
     outcome o;
-    rig_open(&r, 1, rti, "realtime: {deadline_ms: 0.05}\n");
+    rig_open(&r, 1, rti, "realtime: {deadline_ms: 1e-6}\n");
     run(&r, NULL, &o);
     for (int32_t k = 0; k + N < r.recording->n_frames; k++) {
         assert_true(o.status[k] >= MHE_FRAME_DEADLINE); /* or predicted, or restarted */
@@ -386,10 +386,11 @@ static void a_deadline_of_no_time(void **state) {
     rig_close(&r);
 }
 
+/* So little that no machine is fast enough: what happens does not depend on the clock. */
 static void short_of_time(const rig *r, int32_t k, double *time, double *markers, double *emg) {
     (void)time, (void)markers, (void)emg;
     const int within = k >= FAULT && k < FAULT + 20;
-    mhi_estimator_set_deadline(r->f.estimator, within ? 0.05e-3 : 0);
+    mhi_estimator_set_deadline(r->f.estimator, within ? 1e-9 : 0);
 }
 
 static void time_that_comes_back(void **state) {
@@ -397,7 +398,7 @@ static void time_that_comes_back(void **state) {
     outcome o;
     /* what a frame may take is learnt from those before, which took nothing: up to a window more is
      * predicted */
-    recovers("0.05 ms for 20 frames", rti, 1, short_of_time, FAULT + 20 + N + 1, &o);
+    recovers("no time for 20 frames", rti, 1, short_of_time, FAULT + 20 + N + 1, &o);
     assert_true(count(&o, FAULT - N, FAULT + 20 - N, MHE_FRAME_DEADLINE) +
                     count(&o, FAULT - N, FAULT + 20 - N, MHE_FRAME_PREDICTED) >
                 15);

@@ -214,6 +214,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     if (status != MHE_OK) {
         return status;
     }
+    mhi_pace_measure(e);
     memcpy(e->window.solution.x, e->window.guess_x,
            sizeof(double) * (size_t)((e->window.n + 1) * e->window.n_x));
     memcpy(e->window.solution.u, e->window.guess_u,

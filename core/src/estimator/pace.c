@@ -7,39 +7,59 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Times the usual work of a frame, preparation included. A frame that was not prepared linearises
- * itself, which takes less time for its work than the steps that follow do. */
-#define SOLVE 11.0
-#define SOLVE_PREPARED 8.0
+/* Times the usual work of a frame, preparation included: ten with the prediction that may follow.
+ */
+#define SOLVE 8.6
 /* Ahead of a frame there is time, but with a deadline the next one must not wait. */
 #define PREPARE 20.0
 #define PREPARE_BY_CLOCK 8.0
 #define PREDICT 0.6
 #define POSTURES 0.5 /* of what is left, to search postures */
 /* An interior-point step, of each interval, in units of work. */
-#define STEP 4
-/* The first window starts from far and has no frame before it: this much, of each interval. Frames
- * that come before a usual one is known share it, and each may take SLICE of it in any case. */
-#define FIRST 300000.0
-#define SLICE 0.01
+#define STEP 10
+/* The first window starts from far and has no frame before it: this much, of each interval; good
+ * recordings take a third of it at most. Where the integrator needs more than PLAIN for an interval
+ * (finer steps, states of muscles) it is more, up to so many times. Frames that come before a usual
+ * one is known share it, and each may take SLICE of it in any case. */
+#define FIRST 40000.0
+#define PLAIN 40.0
+#define DEARER 4.0
+#define SLICE 0.02
+/* Usual is at most this many times the least median that ever was: hard data must not raise their
+ * own limit. */
+#define DRIFT 1.5
 #define KNOWN 5 /* frames that make a usual one */
-/* Usual is at most this many times the least that ever was: hard data must not raise their own
- * limit. A solver that iterates takes more on harder, but good data; one that does not, hardly. */
-#define DRIFT 1.25
-#define DRIFT_ITERATING 12.0
 /* Of the time to a deadline: what lies between an evaluation that ends late and the estimate. */
 #define GRACE 1.03
 
+static int32_t by_clock(const mhe_estimator *e) {
+    return e->pace.budget > 0;
+}
+
 void mhi_pace_create(mhe_estimator *e) {
-    e->pace.first = FIRST * e->window.n;
+    e->pace.all_first = e->pace.first = FIRST * e->window.n;
+}
+
+void mhi_pace_measure(mhe_estimator *e) {
+    mhi_pace *p = &e->pace;
+    const int64_t before = mhi_work_done(mhi_ocp_work(e->ocp));
+    if (p->n_frames > 0 || p->all_first > FIRST * e->window.n) {
+        return;
+    }
+    (void)mhi_ocp_predict(e->ocp, 0, e->window.guess_x, e->window.guess_u, e->window.solution.x,
+                          NULL);
+    const double taken = (double)(mhi_work_done(mhi_ocp_work(e->ocp)) - before);
+    const double times = fmin(fmax(taken / PLAIN, 1), DEARER);
+    p->first += (times - 1) * p->all_first;
+    p->all_first *= times;
+    if (!by_clock(e)) { /* the frame in work takes part in it */
+        int64_t more = (int64_t)((times - 1) * p->all_first / times);
+        mhi_work_return(mhi_ocp_work(e->ocp), &more);
+    }
 }
 
 static double first_share(const mhe_estimator *e) {
-    return fmax(e->pace.first, SLICE * FIRST * e->window.n);
-}
-
-static int32_t by_clock(const mhe_estimator *e) {
-    return e->pace.budget > 0;
+    return fmax(e->pace.first, SLICE * e->pace.all_first);
 }
 
 static void begin_work(mhe_estimator *e, double most) {
@@ -48,12 +68,11 @@ static void begin_work(mhe_estimator *e, double most) {
 
 void mhi_pace_begin(mhe_estimator *e) {
     mhi_pace *p = &e->pace;
-    const double times = p->prepared > 0 ? SOLVE_PREPARED : SOLVE;
     p->settled = mhi_phase_settled(e);
     if (by_clock(e)) {
         mhi_work_begin(mhi_ocp_work(e->ocp), 0, p->arrival + GRACE * p->budget);
     } else {
-        begin_work(e, p->usual > 0 ? times * p->usual : first_share(e));
+        begin_work(e, p->usual > 0 ? SOLVE * p->usual : first_share(e));
     }
 }
 
@@ -102,9 +121,8 @@ static int by_value(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-static void learn(mhi_pace *p, double work, int32_t iterations) {
+static void learn(mhi_pace *p, double work) {
     double sorted[MHI_PACE_FRAMES];
-    p->iterates |= iterations > 1;
     p->frames[p->n_frames++ % MHI_PACE_FRAMES] = work;
     const int32_t n = p->n_frames < MHI_PACE_FRAMES ? p->n_frames : MHI_PACE_FRAMES;
     memcpy(sorted, p->frames, sizeof sorted);
@@ -112,7 +130,7 @@ static void learn(mhi_pace *p, double work, int32_t iterations) {
     if (n >= KNOWN) {
         const double median = sorted[n / 2];
         p->least = p->usual == 0 ? median : fmin(p->least, median);
-        p->usual = fmin(median, (p->iterates ? DRIFT_ITERATING : DRIFT) * p->least);
+        p->usual = fmin(median, DRIFT * p->least);
     }
 }
 
@@ -129,7 +147,7 @@ static void tell_first(mhe_estimator *e) {
     e->host->log(e->host, MHE_LOG_WARNING, line);
 }
 
-void mhi_pace_end(mhe_estimator *e, int32_t frame_status, int32_t iterations) {
+void mhi_pace_end(mhe_estimator *e, int32_t frame_status) {
     mhi_pace *p = &e->pace;
     const double work = (double)mhi_work_done(mhi_ocp_work(e->ocp)) + p->prepared;
     const int32_t converged = frame_status == MHE_FRAME_OK && p->settled;
@@ -143,7 +161,7 @@ void mhi_pace_end(mhe_estimator *e, int32_t frame_status, int32_t iterations) {
     }
     if (converged || (ended && p->n_converged == 0)) {
         p->n_converged += converged;
-        learn(p, work, iterations);
+        learn(p, work);
     }
     p->ahead = p->prepared = 0;
 }

@@ -18,14 +18,15 @@ typedef struct mhi_pace {
     double frames[MHI_PACE_FRAMES]; /* work of the last that ended as they should, a ring */
     int32_t n_frames, n_converged;  /* so far */
     double usual;                   /* 0: not known yet */
-    int32_t iterates;               /* a frame took more than one iteration */
     double least;                   /* that usual was */
-    double first;                   /* what is left for the frames until then */
+    double first, all_first;        /* what is left for the frames until then, and was */
     int32_t first_told;
     int32_t settled; /* the frame in work is no beginning */
 } mhi_pace;
 
 void mhi_pace_create(mhe_estimator *e);
+/* The first window has its guess: what an interval takes. Overwrites the solution. */
+void mhi_pace_measure(mhe_estimator *e);
 /* The frame in work begins; and its solve, with what is left; and the prediction that stands in for
  * it. */
 void mhi_pace_begin(mhe_estimator *e);
@@ -39,7 +40,7 @@ int32_t mhi_pace_spent(void *estimator, int32_t steps);
 /* Ahead of a frame. */
 void mhi_pace_prepare(mhe_estimator *e);
 void mhi_pace_prepared(mhe_estimator *e, double seconds);
-/* The frame ended with MHE_FRAME_* after so many iterations. */
-void mhi_pace_end(mhe_estimator *e, int32_t frame_status, int32_t iterations);
+/* The frame ended with MHE_FRAME_*. */
+void mhi_pace_end(mhe_estimator *e, int32_t frame_status);
 
 #endif

@@ -185,7 +185,7 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
         estimate->kkt_residual = info.kkt_residual;
         estimate->evaluation_time = info.evaluation_time;
     }
-    mhi_pace_end(e, estimate->status, info.iterations);
+    mhi_pace_end(e, estimate->status);
     mhi_window_advance(e); /* in any case: the next frame needs its place */
     *ready = status == MHE_OK;
     return status;

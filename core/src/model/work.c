@@ -6,6 +6,7 @@
 #define NO_BOUND (INT64_MAX / 4)
 
 void mhi_work_begin(mhi_work *w, int64_t most, double deadline) {
+    w->before += w->most > 0 ? mhi_work_done(w) : 0;
     w->most = most > 0 ? most : NO_BOUND;
     w->deadline = deadline;
     atomic_store_explicit(&w->left, w->most, memory_order_relaxed);
@@ -13,6 +14,10 @@ void mhi_work_begin(mhi_work *w, int64_t most, double deadline) {
 
 int64_t mhi_work_done(const mhi_work *w) {
     return w->most - (int64_t)atomic_load_explicit(&w->left, memory_order_relaxed);
+}
+
+int64_t mhi_work_total(const mhi_work *w) {
+    return w->before + mhi_work_done(w);
 }
 
 static int32_t is_late(const mhi_work *w) {

@@ -19,13 +19,15 @@
 typedef struct mhi_work {
     atomic_llong left;
     int64_t most;
+    int64_t before;  /* done since it was made, up to the last begin */
     double deadline; /* s of CLOCK_MONOTONIC; 0: none */
 } mhi_work;
 
 /* `most` 0: no bound. [hot] */
 void mhi_work_begin(mhi_work *work, int64_t most, double deadline);
-/* Since then, without what is on loan. */
+/* Since then, without what is on loan; and in all. */
 int64_t mhi_work_done(const mhi_work *work);
+int64_t mhi_work_total(const mhi_work *work);
 int32_t mhi_work_spent(const mhi_work *work); /* 1: nothing is left, or it is too late */
 /* Takes from the account, `*loan` first. 0: there is no more. */
 int32_t mhi_work_take(mhi_work *work, int64_t units, int64_t *loan);

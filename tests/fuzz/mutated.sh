@@ -1,0 +1,82 @@
+#!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
+# Whole runs of mhe-run over spoilt inputs: each ends with 0, 1 or 2, within two seconds of processor time, without a
+# report of a sanitizer. The inputs are short parts of shipped files, one of them spoilt at a time.
+#   mutated.sh PATH/mhe-run PATH/mutate SOURCE_DIR [COUNT [FIRST_SEED]]
+# A build with sanitizers and ten thousand runs: mutated.sh build/asan-ubsan/bin/mhe-run build/asan-ubsan/tests/mutate . 10000
+# What fails stays in ./mutated-SEED.* of the folder that it was called from.
+set -u
+run=$1 mutate=$2 source=$3 count=${4:-150} first=${5:-1} home=$PWD
+case $mutate in /*) ;; *) mutate=$PWD/$mutate ;; esac
+case $run in /*) ;; *) run=$PWD/$run ;; esac
+source=$(cd "$source" && pwd)
+. "$source/tests/support/script.sh"
+export ASAN_OPTIONS=detect_leaks=1:exitcode=99 UBSAN_OPTIONS=print_stacktrace=1:exitcode=99
+seconds=2
+
+arm=$source/models/arm19
+cp "$arm/arm19.osim" model.osim
+cp "$source/tests/fuzz/corpus/biomod/arm.bioMod" model.bioMod
+sed '/^nRows/s/=.*/=30/' "$arm/demo_reference.sto" | awk '/^time/ { data = NR } !data || NR <= data + 30' > reference.sto
+"$(dirname "$run")/mhe-sim" noise "$arm/demo_recording.yaml" --set "reference=$PWD/reference.sto" --out made > made.txt 2>&1 &&
+    cp made/recording.c3d data.c3d || fail "no recording: $(cat made.txt)"
+head -n 36 "$arm/demo_markers.trc" | sed '3s/301/30/' > data.trc
+head -n 37 "$arm/demo_emg.sto" | sed 's/nRows=301/nRows=30/' > data.sto
+cat > config.yaml <<'END'
+model: {file: model.osim, unsupported: warn}
+muscle: {curves: paper2021}
+data: {markers: data.trc, emg: data.sto}
+initial: {q: [-0.1, -0.3, -0.1, 0.1], qdot: [0, 0, 0, 0]}
+horizon: {window: 4, ratio: 2}
+costs: [mhe.cost.emg-markers-high]
+output: {picture: false}
+END
+cat > angles.yaml <<'END'
+model: {file: model.bioMod, unsupported: warn}
+data: {angles: angles.sto}
+horizon: {window: 4, ratio: 2}
+costs: [{plugin: mhe.cost.track, signal: q, sigma: 0.01, weight: 30}, {plugin: mhe.cost.track, signal: excitation, value: [0]}]
+output: {picture: false}
+END
+awk 'BEGIN { print "angles\nversion=1\nnRows=20\nnColumns=5\ninDegrees=no\nendheader\ntime\tArm_TransX\tArm_RotY\tArm_RotX\tArm_RotY2"
+    for (k = 0; k < 20; k++) print 0.01 * k, 0.01 * sin(k / 10), 0.3 + 0.01 * k, 0.1, 0.2 }' > angles.sto
+{ grep -vE '^(data|horizon):' config.yaml 
+    echo 'sources: [{plugin: mhe.source.recording, markers: data.trc, emg: data.sto, speed: 0}]'; } > live.yaml
+"$(dirname "$run")/mhe-live" live.yaml --record data.xdf > live.txt 2>&1 || cp "$source/tests/fuzz/corpus/xdf/two_streams.xdf" data.xdf
+n_kinds=7
+seed=$first
+done=0
+refused=0
+while [ $done -lt "$count" ]; do
+    set -- config.yaml --quiet --out out
+    case $((seed % n_kinds)) in
+    0) file=model.osim what=model.file ;;
+    1) file=data.trc what=data.markers ;;
+    2) file=data.sto what=data.emg ;;
+    3) file=config.yaml what= ;;
+    4) file=data.c3d what=data.markers ;;
+    5) file=model.bioMod what=model.file ;;
+    6) file=data.xdf what=data.markers ;;
+    esac
+    spoilt=spoilt.${file##*.}
+    "$mutate" "$file" "$spoilt" "$seed" || fail "mutate $file $seed"
+    [ $file != model.bioMod ] || set -- angles.yaml --quiet --out out
+    if [ -z "$what" ]; then
+        set -- "$spoilt" --quiet --out out
+    else
+        set -- "$@" --set "$what=$spoilt"
+    fi
+    (ulimit -S -t $seconds && exec "$run" "$@") > out.txt 2> err.txt < /dev/null
+    status=$?
+    if [ $status -gt 2 ] || grep -qE 'Sanitizer|runtime error' err.txt; then
+        fail "seed $seed, $file: status $status: $(grep -E 'Sanitizer|runtime error|mhe-run:' err.txt | head -n 2)"
+        cp "$spoilt" "$home/mutated-$seed.${file##*.}"
+    fi
+    [ $status -ne 2 ] || refused=$((refused + 1))
+    [ $status -eq 2 ] || echo "$file" >> went.txt
+    rm -rf out
+    done=$((done + 1))
+    seed=$((seed + 1))
+done
+echo "$done runs, $refused refused, $failed failed; went on:$(sort went.txt | uniq -c | tr -s ' \n' ' ')"
+finish mutated
