@@ -10,7 +10,7 @@
 #include "path.h"
 #include "wrap/wrap.h"
 
-#define POLYNOMIAL_POWERS 16 /* exponents are less */
+#define POLYNOMIAL_POWERS 32 /* exponents are less */
 #define POLYNOMIAL_FACTORS 8 /* coordinates that one term may depend on */
 
 typedef struct route_point {
