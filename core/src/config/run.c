@@ -257,7 +257,8 @@ static mhe_status read_costs(const struct reader *r, const mhi_node *owner, cons
 static void fill_file(const mhi_run *run, const mhe_plugin *plugin, const char *file,
                       void *config) {
     const mhi_transform_section *t = &run->transform;
-    const mhe_real_list turn = {.values = t->turn, .n = 9};
+    const double scale = t->scale == 0 ? 1 : t->scale; /* of a run without that section */
+    const mhe_real_list turn = {.values = t->turn, .n = t->scale == 0 ? 0 : 9};
     for (uint32_t i = 0; i < plugin->option_count; i++) {
         const mhe_option *o = &plugin->options[i];
         char *field = (char *)config + o->offset;
@@ -268,7 +269,7 @@ static void fill_file(const mhi_run *run, const mhe_plugin *plugin, const char *
         } else if (strcmp(o->key, "shift") == 0 && o->type == MHE_TYPE_REAL_LIST) {
             memcpy(field, &t->shift, sizeof t->shift);
         } else if (strcmp(o->key, "scale") == 0 && o->type == MHE_TYPE_REAL) {
-            memcpy(field, &t->scale, sizeof t->scale);
+            memcpy(field, &scale, sizeof scale);
         }
     }
 }
