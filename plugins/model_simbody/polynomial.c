@@ -24,8 +24,9 @@ static void factors_of(int chebyshev, double x, int32_t degree, double *row) {
     }
 }
 
-/* Value, gradient and hessian by x; `powers` as polynomial_length() lays them out. */
-static double polynomial_by_x(const mhe_polynomial *p, const double *powers, double *g, double *h) {
+/* Value, gradient and hessian by x; row k of `powers`: of factor k. */
+static double polynomial_by_x(const mhe_polynomial *p, const double *const *powers, double *g,
+                              double *h) {
     int32_t n = p->n;
     double length = 0;
     for (int32_t term = 0; term < p->n_terms; term++) {
@@ -36,7 +37,7 @@ static double polynomial_by_x(const mhe_polynomial *p, const double *powers, dou
         for (int32_t k = 0; k < n; k++) {
             if (exponent[k] > 0) {
                 at[used] = k;
-                f[used] = powers + 3 * ((size_t)k * POLYNOMIAL_POWERS + exponent[k]);
+                f[used] = powers[k] + 3 * exponent[k];
                 value *= f[used++][0];
             }
         }
@@ -70,15 +71,35 @@ int polynomial_is_left(const path_route *route, const double *numbers) {
     return 0;
 }
 
-double polynomial_length(const path_route *route, const double *numbers, double *scratch,
+/* Chebyshev's of a coordinate: fitted paths have them in common, as they have its range. */
+static const double *factors_shared(const path_route *route, int32_t k, double value,
+                                    route_work *work) {
+    const mhe_polynomial *p = route->length;
+    shared_factors *shared = &work->shared[p->coordinate[k]];
+    if (shared->degree < route->degree || shared->centre != p->centre[k] ||
+        shared->scale != p->scale[k]) {
+        factors_of(1, (value - p->centre[k]) / p->scale[k], route->degree, shared->row);
+        shared->degree = route->degree;
+        shared->centre = p->centre[k];
+        shared->scale = p->scale[k];
+    }
+    return shared->row;
+}
+
+double polynomial_length(const path_route *route, const double *numbers, route_work *work,
                          double *gradient, double *hessian) {
     const mhe_polynomial *p = route->length;
     int32_t n = p->n, rows = route->n_own;
-    double *powers = scratch, *g = powers + 3 * (size_t)n * POLYNOMIAL_POWERS, *h = g + n;
-    for (int32_t k = 0; k < n; k++) {
-        double x = (numbers[4 * p->coordinate[k]] - p->centre[k]) / p->scale[k];
-        factors_of(route->exact != NULL, x, route->degree,
-                   powers + 3 * (size_t)k * POLYNOMIAL_POWERS);
+    double *own = work->polynomial, *g = own + 3 * (size_t)n * POLYNOMIAL_POWERS, *h = g + n;
+    const double **powers = work->factors;
+    for (int32_t k = 0; k < n; k++, own += 3 * POLYNOMIAL_POWERS) {
+        double value = numbers[4 * p->coordinate[k]];
+        if (route->exact != NULL) {
+            powers[k] = factors_shared(route, k, value, work);
+        } else {
+            factors_of(0, (value - p->centre[k]) / p->scale[k], route->degree, own);
+            powers[k] = own;
+        }
     }
     if (gradient == NULL) {
         return polynomial_by_x(p, powers, NULL, NULL);

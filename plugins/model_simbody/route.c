@@ -179,6 +179,9 @@ mhe_status routes_create(const mhe_description *d, const tree *t, const mhe_path
         most(&set->n_wraps, made->n_wraps);
         most(&set->n_own, made->n_own + 2 * made->n_wraps);
         most(&set->n_factors, made->length != NULL ? made->length->n : 0);
+        for (int32_t k = 0; made->length != NULL && k < made->length->n; k++) {
+            most(&set->n_numbers, made->length->coordinate[k] + 1);
+        }
     }
     for (int32_t i = 0; i < t->n_joints; i++) { /* way in, way out, and what moves a point */
         int32_t depth = 0;
@@ -248,6 +251,8 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->gradient, sizeof(double) * n},
                  {&out->hessian, sizeof(double) * n * n},
                  {&out->polynomial, sizeof(double) * n_f * (3 * POLYNOMIAL_POWERS + 1 + n_f)},
+                 {&out->factors, sizeof(double *) * n_f},
+                 {&out->shared, sizeof(shared_factors) * (size_t)set->n_numbers},
                  {&out->strings, sizeof(wrap_string) * n_w},
                  {&out->joints, sizeof(course_joint) * n_w},
                  {&out->steps[0], sizeof(strand_step) * (size_t)set->n_steps},
@@ -286,6 +291,9 @@ void routes_lengths(const tree *t, const route_set *set, const path_pose *pose,
     size_t n_q = (size_t)t->n_q;
     int derive = length_q != NULL || length_qq != NULL;
     double *gradient = derive ? work->gradient : NULL, *hessian = derive ? work->hessian : NULL;
+    for (int32_t i = 0; i < set->n_numbers; i++) {
+        work->shared[i].degree = -1;
+    }
     for (int32_t i = 0; i < set->n; i++) {
         const path_route *route = &set->routes[i];
         double value;
@@ -295,7 +303,7 @@ void routes_lengths(const tree *t, const route_set *set, const path_pose *pose,
         }
         int32_t stride = route->n_own;
         if (route->length != NULL) {
-            value = polynomial_length(route, numbers, work->polynomial, gradient, hessian);
+            value = polynomial_length(route, numbers, work, gradient, hessian);
         } else {
             course_find(route, pose, numbers, work);
             value = strand_length(t, route, pose, work, &stride, gradient,

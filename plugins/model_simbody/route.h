@@ -10,7 +10,7 @@
 #include "path.h"
 #include "wrap/wrap.h"
 
-#define POLYNOMIAL_POWERS 16 /* exponents are less */
+#define POLYNOMIAL_POWERS 32 /* exponents are less */
 #define POLYNOMIAL_FACTORS 8 /* coordinates that one term may depend on */
 
 typedef struct route_point {
@@ -72,6 +72,12 @@ typedef struct course_piece {
     int32_t joint[2]; /* instead of points; -1: none */
 } course_piece;
 
+/* Chebyshev's polynomials of a coordinate with two derivatives, as far as they are made. */
+typedef struct shared_factors {
+    int32_t degree;
+    double centre, scale, row[3 * POLYNOMIAL_POWERS];
+} shared_factors;
+
 /* Scratch of one thread, large enough for every route of the model. */
 typedef struct route_work {
     void *memory;
@@ -92,11 +98,14 @@ typedef struct route_work {
     strand_step *steps[2];
     double *gradient, *hessian; /* of a route, with the joints' freedoms */
     double *polynomial;         /* scratch */
+    const double **factors;     /* [n_factors] */
+    shared_factors *shared;     /* [n_numbers] */
 } route_work;
 
 typedef struct route_set {
     /* routes; most of each in one of them */
     int32_t n, n_points, n_wraps, n_own, n_steps, n_factors;
+    int32_t n_numbers; /* coordinates up to the last one that a polynomial has */
     path_route *routes;
 } route_set;
 
@@ -162,7 +171,7 @@ double strand_length(const tree *tree, const path_route *route, const path_pose 
 int polynomial_is_left(const path_route *route, const double *numbers);
 
 /* Length, gradient [n_own] and hessian [n_own x n_own] (both NULL: not wanted). */
-double polynomial_length(const path_route *route, const double *numbers, double *scratch,
+double polynomial_length(const path_route *route, const double *numbers, route_work *work,
                          double *gradient, double *hessian);
 
 #endif
