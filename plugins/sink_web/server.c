@@ -288,8 +288,8 @@ static mhe_status listen_on(web *w, mhe_error *err) {
                         w->config.address, (int)w->config.port);
     }
     char line[256];
-    (void)snprintf(line, sizeof line, "the page: http://%s:%d/%s%s", w->config.address,
-                   (int)w->config.port,
+    const int port = lws_get_vhost_listen_port(lws_get_vhost_by_name(w->context, "default"));
+    (void)snprintf(line, sizeof line, "the page: http://%s:%d/%s%s", w->config.address, port,
                    w->config.open ? "" : "?token=", w->config.open ? "" : w->token);
     w->host->log(w->host, MHE_LOG_INFO, line);
     return MHE_OK;
@@ -370,7 +370,8 @@ static const mhe_sink_ops web_ops = {.size = sizeof web_ops,
 static const mhe_option web_options[] = {
     MHE_OPT_TEXT(struct web_config, address, 0, "127.0.0.1",
                  "Interface to listen on; 0.0.0.0 lets other machines in."),
-    MHE_OPT_INT(struct web_config, port, 8080, 1, 65535, "1", "Port."),
+    MHE_OPT_INT(struct web_config, port, 8080, 0, 65535, "1",
+                "Port; 0: the system chooses a free one, which is printed."),
     MHE_OPT_TEXTS(struct web_config, origins, 0,
                   "Origins of other pages that may connect, as https://app.foxglove.dev."),
     MHE_OPT_BOOL(struct web_config, open, 0, "Whoever sees the page may stop and record."),

@@ -38,7 +38,9 @@ typedef struct mhe_sink_run {
     uint32_t signal_size;           /* stride of `signals` */
     const mhe_sink_signal *signals; /* q, qdot, activation, excitation, force, moment,
                                      * residual_torque, markers, and as measured: emg,
-                                     * markers_measured */
+                                     * markers_measured; to be drawn: skeleton (pairs of points,
+                                     * from body to body), paths (of muscles, NaN behind their
+                                     * last point) */
 } mhe_sink_run;
 
 typedef struct mhe_sink_sample {

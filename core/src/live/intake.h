@@ -52,8 +52,8 @@ void mhi_mailbox_put(mhi_mailbox *box, mhi_packet *packet); /* takes it over; NU
  * CLOCK_MONOTONIC); NULL: none came. [any] */
 mhi_packet *mhi_mailbox_take(mhi_mailbox *box, double deadline);
 void mhi_mailbox_put_back(mhi_mailbox *box, mhi_packet *packet); /* the oldest again. [any] */
-int32_t mhi_mailbox_waiting(mhi_mailbox *box); /* packets in it. [any] */
-void mhi_mailbox_wake(mhi_mailbox *box);       /* whoever waits comes back. [any] */
+int32_t mhi_mailbox_waiting(mhi_mailbox *box);                   /* packets in it. [any] */
+void mhi_mailbox_wake(mhi_mailbox *box); /* whoever waits comes back. [any] */
 
 typedef struct mhi_intake mhi_intake;
 

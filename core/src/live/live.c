@@ -110,8 +110,8 @@ mhe_status mhe_live_open(mhe_config *config, const mhe_live_setup *setup, mhe_li
     mhe_status status = open_estimator(l, err);
     if (status == MHE_OK) {
         mhi_live_set_control(l);
-        const mhi_outlets_setup sinks = {&l->own_host, l->run, &l->feed.info, l->folder,
-                                         &l->control};
+        const mhi_outlets_setup sinks = {&l->own_host,  l->run,    l->model,
+                                         &l->feed.info, l->folder, &l->control};
         status = mhi_outlets_start(&sinks, &l->outlets, err);
     }
     if (status == MHE_OK && setup->record != NULL) {

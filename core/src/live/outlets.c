@@ -3,6 +3,7 @@
 
 #include "base/arena.h"
 #include "base/clock.h"
+#include "live/figure.h"
 #include "live/ring.h"
 
 #include <math.h>
@@ -28,6 +29,9 @@ enum {
     MARKERS,
     EMG,
     MEASURED,
+    N_ESTIMATED, /* up to here from the estimator; the rest is drawn on the sink's thread */
+    SKELETON = N_ESTIMATED,
+    PATHS,
     N_SIGNALS
 };
 
@@ -40,6 +44,8 @@ typedef struct outlet {
     mhi_ring *ring;
     double *record;
     const double *values[N_SIGNALS];
+    mhi_figure_view view;
+    double *bones, *paths;
     pthread_t thread;
     int started;
     pthread_mutex_t mutex; /* of what follows */
@@ -50,6 +56,7 @@ typedef struct outlet {
 struct mhi_outlets {
     const mhe_host *host;
     mhi_arena arena;
+    mhi_figure figure;
     mhe_sink_run run;
     mhe_sink_signal signals[N_SIGNALS];
     mhe_sink_control control;
@@ -99,9 +106,11 @@ static mhe_status name_signals(mhi_outlets *o, const mhi_outlets_setup *setup, m
         [RESIDUAL] = {"residual_torque", "N m (N)", info->n_residual_torques, q},
         [MARKERS] = {"markers", "m", 3 * info->n_markers, axes},
         [EMG] = {"emg", "1", info->n_muscles, m},
-        [MEASURED] = {"markers_measured", "m", 3 * info->n_markers, axes}};
+        [MEASURED] = {"markers_measured", "m", 3 * info->n_markers, axes},
+        [SKELETON] = {"skeleton", "m", 6 * o->figure.n_bones, o->figure.bone_labels},
+        [PATHS] = {"paths", "m", 3 * MHI_FIGURE_POINTS * o->figure.n_paths, o->figure.path_labels}};
     memcpy(o->signals, signals, sizeof signals);
-    for (int32_t i = 0; i < N_SIGNALS; i++) {
+    for (int32_t i = 0; i < N_ESTIMATED; i++) {
         o->n_values += signals[i].n;
     }
     o->markers_channel = find_channel(info, "markers");
@@ -137,20 +146,20 @@ void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
     if (o->n == 0) {
         return;
     }
-    const double *const values[N_SIGNALS] = {[Q] = e->q,
-                                             [QDOT] = e->qdot,
-                                             [ACTIVATION] = e->activation,
-                                             [EXCITATION] = e->excitation,
-                                             [FORCE] = e->force,
-                                             [MOMENT] = e->moment,
-                                             [RESIDUAL] = e->residual,
-                                             [MARKERS] = e->markers,
-                                             [EMG] = measured(e, o->emg_channel),
-                                             [MEASURED] = measured(e, o->markers_channel)};
+    const double *const values[N_ESTIMATED] = {[Q] = e->q,
+                                               [QDOT] = e->qdot,
+                                               [ACTIVATION] = e->activation,
+                                               [EXCITATION] = e->excitation,
+                                               [FORCE] = e->force,
+                                               [MOMENT] = e->moment,
+                                               [RESIDUAL] = e->residual,
+                                               [MARKERS] = e->markers,
+                                               [EMG] = measured(e, o->emg_channel),
+                                               [MEASURED] = measured(e, o->markers_channel)};
     const double head[HEAD] = {(double)o->number++, e->time,       host_time,
                                e->status,           e->iterations, e->solve_time};
     double *at = put(o->record, head, HEAD);
-    for (int32_t i = 0; i < N_SIGNALS; i++) {
+    for (int32_t i = 0; i < N_ESTIMATED; i++) {
         at = put(at, values[i], o->signals[i].n);
     }
     for (int32_t i = 0; i < o->n; i++) {
@@ -185,6 +194,7 @@ static mhe_status take(outlet *s, int64_t lost, mhe_error *err) {
                                     .iterations = (int32_t)r[4],
                                     .solve_time = r[5],
                                     .values = s->values};
+    mhi_figure_draw(&s->view, s->values[Q], s->bones, s->paths);
     count(s, r[2], lost);
     return s->ops->take(s->self, &sample, err);
 }
@@ -238,11 +248,21 @@ static mhe_status start_one(mhi_outlets *o, outlet *s, const mhi_outlets_setup *
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     const double *at = s->record + HEAD;
-    for (int32_t i = 0; i < N_SIGNALS; i++) {
+    for (int32_t i = 0; i < N_ESTIMATED; i++) {
         s->values[i] = at;
         at += o->signals[i].n;
     }
-    mhe_status status = s->ops->create(setup->host, use->config, &s->self, &why);
+    s->bones = MHI_TAKE(&o->arena, double, o->signals[SKELETON].n + 1);
+    s->paths = MHI_TAKE(&o->arena, double, o->signals[PATHS].n + 1);
+    s->values[SKELETON] = s->bones;
+    s->values[PATHS] = s->paths;
+    if (s->bones == NULL || s->paths == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhe_status status = mhi_figure_view_open(&o->figure, &o->arena, &s->view, &why);
+    if (status == MHE_OK) {
+        status = s->ops->create(setup->host, use->config, &s->self, &why);
+    }
     if (status == MHE_OK) {
         status = s->ops->open(s->self, &o->run, &o->control, &why);
     }
@@ -265,7 +285,13 @@ mhe_status mhi_outlets_start(const mhi_outlets_setup *setup, mhi_outlets **outle
     }
     o->host = setup->host;
     o->control = *setup->control;
-    mhe_status status = name_signals(o, setup, err);
+    mhe_status status =
+        setup->run->sinks.n == 0
+            ? MHE_OK
+            : mhi_figure_open(setup->host, setup->run, setup->model, &o->arena, &o->figure, err);
+    if (status == MHE_OK) {
+        status = name_signals(o, setup, err);
+    }
     o->outlets = calloc((size_t)setup->run->sinks.n + 1, sizeof *o->outlets);
     o->record = MHI_TAKE(&o->arena, double, HEAD + o->n_values);
     if (status == MHE_OK && (o->outlets == NULL || o->record == NULL)) {
@@ -298,10 +324,12 @@ void mhi_outlets_stop(mhi_outlets *o) {
         if (s->self != NULL) {
             s->ops->destroy(s->self);
         }
+        mhi_figure_view_close(&s->view);
         mhi_ring_free(s->ring);
         (void)pthread_mutex_destroy(&s->mutex);
     }
     free(o->outlets);
+    mhi_figure_close(&o->figure);
     mhi_arena_free(&o->arena);
     free(o);
 }

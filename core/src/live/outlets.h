@@ -5,6 +5,7 @@
 
 #include "config/run.h"
 
+#include <mhe/description.h>
 #include <mhe/sink.h>
 
 typedef struct mhi_outlets mhi_outlets;
@@ -12,6 +13,7 @@ typedef struct mhi_outlets mhi_outlets;
 typedef struct mhi_outlets_setup {
     const mhe_host *host;
     const mhi_run *run;
+    const mhe_description *model;
     const mhe_estimator_info *info;
     const char *folder;
     const mhe_sink_control *control;
