@@ -332,8 +332,46 @@ static void channels_have_shapes_and_delays(void **state) {
     }
 }
 
+/* Names without a side, and patterns: of one leg's electrodes on a model of two. */
+static void sides_and_patterns(void **state) {
+    static const mhe_muscle muscles[] = {
+        {.name = "biceps_r"}, {.name = "brachialis_r"}, {.name = "biceps_l"}};
+    static const char *const all[] = {"b*"}, *const one[] = {"biceps"}, *const none[] = {"soleus"};
+    emg_rig rig;
+    double emg[3 * FRAMES];
+    (void)state;
+    rig_open(&rig);
+    rig.model.muscles = muscles;
+    mhi_emg_channel channels[2] = {rig.run.emg.channels[0], rig.run.emg.channels[1]};
+    mhi_emg_channel *const own = rig.run.emg.channels;
+    rig.run.emg.channels = channels;
+    rig.run.emg.n_channels = 1;
+    channels[0].gains.n = 0;
+    channels[0].muscles = (mhe_text_list){all, 1};
+    rig.run.emg.side = MHI_EMG_RIGHT;
+    mhi_table *table = rig_table(ROWS);
+    assert_int_equal(rig_read(&rig, table, FRAMES, emg), MHE_OK);
+    assert_int_equal(rig.n_found, 3); /* the pattern holds for both sides as it is */
+    channels[0].muscles = (mhe_text_list){one, 1};
+    assert_int_equal(rig_read(&rig, table, FRAMES, emg), MHE_OK);
+    assert_int_equal(rig.n_found, 1);
+    assert_true(isfinite(emg[3 * 100]) && isnan(emg[3 * 100 + 1]) && isnan(emg[3 * 100 + 2]));
+    rig.run.emg.side = MHI_EMG_LEFT;
+    assert_int_equal(rig_read(&rig, table, FRAMES, emg), MHE_OK);
+    assert_true(isnan(emg[3 * 100]) && isfinite(emg[3 * 100 + 2]));
+    mhi_table_free(table);
+    channels[0].muscles = (mhe_text_list){none, 1};
+    check_refused(&rig, MHE_E_CONFIG, "the model has no muscle 'soleus'");
+    rig.run.emg.side = MHI_EMG_NO_SIDE;
+    channels[0].muscles = (mhe_text_list){one, 1};
+    check_refused(&rig, MHE_E_CONFIG, "did you mean 'biceps_");
+    rig.run.emg.channels = own;
+    rig_close(&rig);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(sides_and_patterns),
         cmocka_unit_test(live_and_recorded_are_the_same_bits),
         cmocka_unit_test(electrodes_become_muscles),
         cmocka_unit_test(times_are_aligned),

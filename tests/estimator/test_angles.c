@@ -105,31 +105,33 @@ static void gaps_are_bridged(void **state) {
 }
 
 /* The reference's angles as another program writes them: in degrees, said by the header. */
-static void write_degrees(char *path) {
+/* In degrees under plain names, or in radians as OpenSim's states are called. */
+static void write_angles(char *path, int32_t degrees) {
     mhi_table *t = NULL;
     assert_int_equal(mhi_sto_read(MODELS "demo_reference.sto", &t, NULL), MHE_OK);
     FILE *file = fdopen(mkstemps(path, 4), "w");
     assert_non_null(file);
-    (void)fprintf(file, "angles\ninDegrees=yes\nendheader\ntime");
+    (void)fprintf(file, "angles\nversion=3\ninDegrees=%s\nendheader\ntime", degrees ? "yes" : "no");
     for (int32_t i = 0; i < N_Q; i++) {
-        (void)fprintf(file, "\t%s", t->labels[i]);
+        const char *name = t->labels[i] + 2; /* of q_NAME */
+        (void)fprintf(file, degrees ? "\tq_%s" : "\t/jointset/j/%s/value", name);
     }
     for (int32_t k = 0; k < t->n_rows; k++) {
         (void)fprintf(file, "\n%.17g", t->time[k]);
         for (int32_t i = 0; i < N_Q; i++) {
-            (void)fprintf(file, "\t%.17g", t->values[k * t->n_columns + i] * 180 / MHI_PI);
+            (void)fprintf(file, "\t%.17g",
+                          t->values[k * t->n_columns + i] * (degrees ? 180 / MHI_PI : 1));
         }
     }
     assert_int_equal(fclose(file), 0);
     mhi_table_free(t);
 }
 
-static void degrees_are_converted(void **state) {
-    (void)state;
+static void expect_the_same(int32_t degrees) {
     static motion by_degrees;
-    char path[] = "/tmp/mhe-degrees-XXXXXX.mot", config[2048];
+    char path[] = "/tmp/mhe-degrees-XXXXXX.sto", config[2048];
     double q = 0, force = 0;
-    write_degrees(path);
+    write_angles(path, degrees);
     (void)snprintf(config, sizeof config,
                    HEAD "data: {angles: %s, emg: " MODELS "demo_emg.sto}\n" ANGLE_COSTS, path);
     estimate(config, no_gap, &by_degrees);
@@ -138,6 +140,16 @@ static void degrees_are_converted(void **state) {
     print_message("in degrees and in radians: %.1e rad, %.1e N apart\n", q, force);
     assert_true(q < 1e-7); /* the reference has 12 digits */
     assert_true(force < 1e-3);
+}
+
+static void degrees_are_converted(void **state) {
+    (void)state;
+    expect_the_same(1);
+}
+
+static void paths_of_states_are_names(void **state) {
+    (void)state;
+    expect_the_same(0);
 }
 
 static void mistakes_are_named(void **state) {
@@ -157,6 +169,7 @@ static void mistakes_are_named(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(forces_are_those_by_markers), cmocka_unit_test(gaps_are_bridged),
-        cmocka_unit_test(degrees_are_converted), cmocka_unit_test(mistakes_are_named)};
+        cmocka_unit_test(degrees_are_converted), cmocka_unit_test(paths_of_states_are_names),
+        cmocka_unit_test(mistakes_are_named)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -74,6 +74,10 @@ typedef struct mhi_transform_section {
 #define MHI_EMG_RMS 2
 #define MHI_EMG_NO_ENVELOPE 3
 
+#define MHI_EMG_NO_SIDE 0
+#define MHI_EMG_LEFT 1
+#define MHI_EMG_RIGHT 2
+
 /* One electrode: a column of data.emg, and the muscles it stands for. */
 typedef struct mhi_emg_channel {
     const char *name;
@@ -102,6 +106,7 @@ typedef struct mhi_emg_section {
     double max;   /* largest value handed on */
     double rate;  /* Hz, of the frames where there are no markers */
     const char *mvc_file;
+    int32_t side; /* MHI_EMG_*, of muscles that channels name without one */
     mhi_emg_channel *channels;
     int32_t n_channels;
 } mhi_emg_section;

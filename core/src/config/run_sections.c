@@ -125,11 +125,15 @@ static const mhe_option emg_options[] = {
     MHE_OPT_PATH(mhi_emg_section, mvc_file, 0,
                  "EMG of maximal contractions with the same columns: the envelope's maximum is the "
                  "MVC; or a single row of MVC values."),
+    MHE_OPT_ENUM(mhi_emg_section, side, "none", "none|left|right",
+                 "Side of muscles that channels name without one: soleus is soleus_r, r_soleus or "
+                 "soleus_right."),
 };
 
 static const mhe_option channel_options[] = {
     MHE_OPT_TEXT(mhi_emg_channel, name, MHE_OPT_REQUIRED, NULL, "Column of data.emg."),
-    MHE_OPT_TEXTS(mhi_emg_channel, muscles, MHE_OPT_REQUIRED, "Muscles it stands for."),
+    MHE_OPT_TEXTS(mhi_emg_channel, muscles, MHE_OPT_REQUIRED,
+                  "Muscles it stands for, or patterns: glmax*_r."),
     MHE_OPT_REALS(mhi_emg_channel, gains, 0, 0, 1e6, "1",
                   "Factor of each of these muscles; none: all 1."),
     MHE_OPT_REAL(mhi_emg_channel, gain, 1, 0, 1e6, "1", "Factor of the whole channel."),

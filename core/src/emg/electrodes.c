@@ -3,6 +3,7 @@
 
 #include "base/text.h"
 
+#include <fnmatch.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,15 +19,6 @@ static const char **muscle_names(const mhe_description *d, mhi_arena *arena) {
         names[i] = d->muscles[i].name;
     }
     return names;
-}
-
-static int32_t find_name(const char *const *names, int32_t n, const char *name) {
-    for (int32_t i = 0; i < n; i++) {
-        if (strcmp(names[i], name) == 0) {
-            return i;
-        }
-    }
-    return -1;
 }
 
 mhe_status mhi_electrodes_columns(const mhi_run *run, const char *source, const char *const *labels,
@@ -58,16 +50,43 @@ mhe_status mhi_electrodes_columns(const mhi_run *run, const char *source, const 
     return MHE_OK;
 }
 
+/* How models write a side, of a muscle that is named without one. */
+#define N_SIDES 6
+static int32_t spell(int32_t side, int32_t form, const char *name, char *out, size_t size) {
+    static const char *const forms[2][N_SIDES] = {
+        {"%s_l", "l_%s", "%s_left", "left_%s", "%s_L", "L_%s"},
+        {"%s_r", "r_%s", "%s_right", "right_%s", "%s_R", "R_%s"}};
+    if (form == 0) {
+        (void)snprintf(out, size, "%s", name);
+        return 1;
+    }
+    if (side == MHI_EMG_NO_SIDE) {
+        return 0;
+    }
+    const char *text = forms[side == MHI_EMG_RIGHT][form - 1], *gap = strstr(text, "%s");
+    (void)snprintf(out, size, "%.*s%s%s", (int)(gap - text), text, name, gap + 2);
+    return 1;
+}
+
+/* A muscle has one channel. */
+static mhe_status lay_wire(mhi_electrodes *e, const mhi_run *run, const mhi_emg_channel *c, wire w,
+                           const char *name, const char **owner, mhe_error *err) {
+    if (owner[w.muscle] != NULL) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
+                           "emg.channels: the muscle '%s' stands at two channels, '%s' and '%s'",
+                           name, owner[w.muscle], c->name);
+    }
+    owner[w.muscle] = c->name;
+    e->wires[e->n_wires++] = w;
+    return MHE_OK;
+}
+
 static mhe_status lay_wires(mhi_electrodes *e, const mhi_run *run, const mhe_description *d,
                             mhe_error *err) {
     const mhi_emg_section *o = &run->emg;
-    int32_t n = 0;
-    for (int32_t i = 0; i < o->n_channels; i++) {
-        n += o->channels[i].muscles.n;
-    }
     const char **names = muscle_names(d, &e->arena);
     const char **owner = MHI_TAKE(&e->arena, const char *, d->n_muscles + 1);
-    e->wires = MHI_TAKE(&e->arena, wire, n);
+    e->wires = MHI_TAKE(&e->arena, wire, d->n_muscles + 1);
     if (names == NULL || owner == NULL || e->wires == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
@@ -75,23 +94,30 @@ static mhe_status lay_wires(mhi_electrodes *e, const mhi_run *run, const mhe_des
         const mhi_emg_channel *c = &o->channels[i];
         for (int32_t k = 0; k < c->muscles.n; k++) {
             const char *name = c->muscles.values[k];
-            const int32_t muscle = find_name(names, d->n_muscles, name);
+            const double gain = c->gains.n > 0 ? c->gains.values[k] : 1;
+            const double shape = c->shape.n == 0 ? 0 : c->shape.values[c->shape.n > 1 ? k : 0];
+            const int32_t before = e->n_wires;
+            mhe_status status = MHE_OK;
+            for (int32_t form = 0; form <= N_SIDES && e->n_wires == before; form++) {
+                char pattern[256];
+                if (spell(o->side, form, name, pattern, sizeof pattern)) {
+                    for (int32_t m = 0; m < d->n_muscles && status == MHE_OK; m++) {
+                        status = fnmatch(pattern, names[m], 0) == 0
+                                     ? lay_wire(e, run, c, (wire){i, m, gain, shape}, names[m],
+                                                owner, err)
+                                     : MHE_OK;
+                    }
+                }
+                if (status != MHE_OK) {
+                    return status;
+                }
+            }
             char hint[256];
-            if (muscle < 0) {
+            if (e->n_wires == before) {
                 return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
                                    "emg.channels: '%s': the model has no muscle '%s'%s", c->name,
                                    name, mhi_suggest(hint, sizeof hint, name, names, d->n_muscles));
             }
-            if (owner[muscle] != NULL) {
-                return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
-                                   "emg.channels: the muscle '%s' stands at two channels, '%s' and "
-                                   "'%s'",
-                                   name, owner[muscle], c->name);
-            }
-            owner[muscle] = c->name;
-            e->wires[e->n_wires++] =
-                (wire){i, muscle, c->gains.n > 0 ? c->gains.values[k] : 1,
-                       c->shape.n == 0 ? 0 : c->shape.values[c->shape.n > 1 ? k : 0]};
         }
     }
     return MHE_OK;

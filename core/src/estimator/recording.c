@@ -73,6 +73,18 @@ static void to_radians(double *values, int32_t n_frames, const mhe_description *
     }
 }
 
+/* OpenSim's states are called by paths: "/jointset/hip_r/hip_flexion_r/value". */
+static void shorten_paths(mhi_table *table) {
+    for (int32_t i = 0; i < table->n_labels; i++) {
+        char *label = table->labels[i], *end = strrchr(label, '/');
+        if (label[0] == '/' && end != label && strcmp(end, "/value") == 0) {
+            *end = '\0';
+            const char *name = strrchr(label, '/') + 1;
+            memmove(label, name, strlen(name) + 1);
+        }
+    }
+}
+
 /* Measured joint angles; without markers their times are the frames'. */
 static mhe_status read_angles(mhi_recording *r, const mhi_run *run, const mhe_description *d,
                               const mhe_host *host, const mhe_host *told, mhe_error *err) {
@@ -82,6 +94,7 @@ static mhe_status read_angles(mhi_recording *r, const mhi_run *run, const mhe_de
     if (status != MHE_OK) {
         return status;
     }
+    shorten_paths(table);
     const char **names = mhi_recording_names(d, 'q', d->n_coordinates);
     int32_t n_found = 0;
     status = names == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
