@@ -688,7 +688,7 @@ AT(mhe_solve_control, progress, 24);
 AT(mhe_solve_control, budget, 32);
 AT(mhe_solve_control, spent, 40);
 
-SIZE(mhe_solve_info, 48);
+SIZE(mhe_solve_info, 56);
 AT(mhe_solve_info, size, 0);
 AT(mhe_solve_info, outcome, 4);
 AT(mhe_solve_info, iterations, 8);
@@ -696,6 +696,8 @@ AT(mhe_solve_info, objective, 16);
 AT(mhe_solve_info, kkt_residual, 24);
 AT(mhe_solve_info, primal_residual, 32);
 AT(mhe_solve_info, evaluation_time, 40);
+AT(mhe_solve_info, programs, 48);
+AT(mhe_solve_info, fallbacks, 52);
 
 SIZE(mhe_solver_ops, 56);
 AT(mhe_solver_ops, size, 0);
