@@ -69,13 +69,9 @@ shoulder=${MHE_SHARED:-$source/../shared}/data/opensim/ThoracoscapularShoulderMo
 if [ -r "$shoulder" ]; then
     muscles=$("$bin/mhe-model" info "$shoulder" | awk '/^muscles:/ { on = 1; next } /^$/ { on = 0 } on { print $1 }')
     # shellcheck disable=SC2086 # names without blanks
-    excitations e.sto 1.0 0.1 0.08 $muscles
-    config shoulder.yaml "$shoulder" shoulder-sim "" 2
+    excitations e.sto 1.0 0.1 0.05 $muscles
+    config shoulder.yaml "$shoulder" shoulder-sim "" 3
     "$bin/mhe-sim" forward shoulder.yaml --input e.sto --rate 100 --out shoulder-sim > sim.txt 2>&1 || fail "$(cat sim.txt)"
     estimate shoulder 0.05 3
-    XDG_CACHE_HOME=$work/cache
-    export XDG_CACHE_HOME
-    config fitted.yaml "$shoulder" shoulder-sim ", paths: fitted" 2
-    estimate fitted 0.05 3
 fi
 finish loops

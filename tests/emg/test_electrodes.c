@@ -302,6 +302,7 @@ static void zero_phase_follows_without_delay(void **state) {
 /* Lloyd and Besier (2003): excitation (exp(A e) - 1) / (exp(A) - 1), one A for a channel or one a
  * muscle; a channel with a delay of its own shows what was that much before, the others do not. */
 static void channels_have_shapes_and_delays(void **state) {
+    enum { TRICEPS = 1, BRACHIALIS = 2 };
     (void)state;
     const double shapes[] = {-2, 0}, one[] = {-1};
     double plain[3 * FRAMES], bent[3 * FRAMES];
@@ -322,9 +323,9 @@ static void channels_have_shapes_and_delays(void **state) {
         for (int32_t k = 60; k < FRAMES; k++) {
             const double *then = plain + 3 * (k - frames), *now = plain + 3 * k;
             assert_near(bent[3 * k], expm1(-2 * now[0]) / expm1(-2), 1e-12);
-            assert_true(bent[3 * k + 1] == now[1]); /* A = 0 */
-            assert_near(bent[3 * k + 2], expm1(-then[2]) / expm1(-1), 1e-12);
-            assert_true(bent[3 * k] > now[0] || now[0] == 0);
+            assert_true(bent[3 * k + BRACHIALIS] == now[BRACHIALIS]); /* A = 0 */
+            assert_near(bent[3 * k + TRICEPS], expm1(-then[TRICEPS]) / expm1(-1), 1e-12);
+            assert_true(bent[3 * k] >= now[0]);
             compared += now[0] > 0.01;
         }
         assert_true(compared > 50);
