@@ -37,7 +37,7 @@ estimate my
 
 # The variants that its text names.
 without=$(sed -n 's/.*Without EMG: `\(costs: [^`]*\)`.*/\1/p' "$readme")
-some=$(sed -n 's/^ *`\(costs: \[{plugin: mhe.cost.emg-markers-high, tracked: .*\)`\.$/\1/p' "$readme")
+some=$(sed -n 's/^ *`\(costs: \[{plugin: mhe.cost.emg-markers, tracked: [^`]*\)`\..*/\1/p' "$readme")
 [ -n "$without" ] && [ -n "$some" ] || fail "the README's variants are not found"
 sed -e 's/, emg: emg.sto//' -e "s/^costs:.*/$without/" my.yaml > without.yaml
 estimate without

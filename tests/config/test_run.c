@@ -164,7 +164,8 @@ static void bad_electrodes_and_formats(void **state) {
                    ":7: emg.channels: must be a list: [{name: COLUMN, muscles: [MUSCLE, ...]}, "
                    "...]");
     assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n    - {name: a}\n",
-                   ":10: emg.channels: the key 'muscles' is missing: Muscles it stands for.");
+                   ":10: emg.channels: the key 'muscles' is missing: Muscles it stands for, "
+                   "or patterns: glmax*_r.");
     assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
                               "    - {name: a, muscles: [x, y], gains: [1]}\n",
                    ":10: emg.channels: channel 'a' has 1 gains for 2 muscles");

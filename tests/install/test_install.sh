@@ -113,7 +113,7 @@ defaults() {
     if "$prefix/bin/mhe-run" --check "$source/models/arm19/demo.yaml" --set solver= >"$work/check.txt" 2>&1; then
         give_up "no plugin is named anywhere, yet one is used"
     fi
-    expect "solver: the id of a plugin is missing" "$work/check.txt"
+    expect "model: the id of a plugin is missing" "$work/check.txt"
     cp "$work/defaults.yaml" "$file"
 }
 

@@ -182,6 +182,15 @@ static void check_zero(const view *v, int32_t l) {
     }
 }
 
+/* Whether the model's own weight is to be carried: it can move along two axes at least. */
+static int32_t is_free(const mhe_description *d) {
+    int32_t n = 0;
+    for (int32_t i = 0; i < d->n_coordinates; i++) {
+        n += !d->coordinates[i].rotational;
+    }
+    return n >= 2;
+}
+
 mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *d, const mhi_recording *r,
                              mhi_findings *findings, mhe_error *err) {
     view v = {.run = run, .d = d, .r = r, .findings = findings};
@@ -196,7 +205,7 @@ mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *d, const
     for (int32_t i = 0; i < 3 && g > 0; i++) {
         v.up[i] = -d->gravity[i] / g;
     }
-    if (status == MHE_OK && g > 0 && v.weight > MUCH) { /* a person, not a limb */
+    if (status == MHE_OK && g > 0 && v.weight > MUCH && is_free(d)) { /* a person, not a limb */
         check_direction(&v);
         for (int32_t l = 0; l < v.loads->n_loads; l++) {
             check_points(&v, l);
