@@ -10,7 +10,7 @@
 #include <libwebsockets.h>
 #include <mhe/sink.h>
 
-#define WEB_FRAMES 512    /* in the ring; a power of two */
+#define WEB_FRAMES 512   /* in the ring; a power of two */
 #define WEB_CLIENTS 32   /* at most */
 #define WEB_COMMAND 4096 /* bytes of a client's message */
 #define WEB_SUBSCRIPTIONS 64
