@@ -51,7 +51,7 @@ typedef struct rti_leap {
     int32_t solved;   /* the program was, to its tolerance */
     double length;    /* part of its step */
     double left;      /* largest gap at the result, by the linearisation */
-    double front;     /* its longest component among those of u_0 and x_1 */
+    double front;     /* its longest component among those of u_0 (see step.c) and x_1 */
     double first_gap; /* largest |x_1 - F_0| at the result */
     double cost;      /* scaled, of the quadratic model at the result */
 } rti_leap;

@@ -74,6 +74,23 @@ static double longest(const rti_solver *s, int32_t from, int32_t n) {
     return length;
 }
 
+/* The same of the first controls, where some may be torques of hundreds of N m and others parts of
+ * a whole: a control that the cost bends less than the most bent one counts for as much less (equal
+ * parts of their sigmas count alike), but never for less than its part of its range. */
+static double longest_control(const rti_solver *s) {
+    const double *H = s->here.stages[0].H;
+    double most = 0, length = 0;
+    for (int32_t i = 0; i < s->shape.n_u; i++) {
+        most = fmax(most, H[i * (s->shape.ld_z + 1)]);
+    }
+    for (int32_t i = 0; i < s->shape.n_u; i++) {
+        const double bent = most > 0 ? H[i * (s->shape.ld_z + 1)] / most : 1;
+        const double part = fmax(sqrt(fmax(bent, 0)), 1 / (s->upper[i] - s->lower[i]));
+        length = fmax(length, fmin(part, 1) * fabs(s->trial.w[i] - s->here.w[i]));
+    }
+    return length;
+}
+
 static void blend(double length, size_t n, const double *to, double *from) {
     for (size_t i = 0; i < n; i++) {
         from[i] += length * (to[i] - from[i]);
@@ -194,8 +211,8 @@ static int32_t leap(rti_solver *s, int32_t result) {
                 return RTI_LATE;
             }
             leap->taken = 1;
-            leap->front = fmax(longest(s, 0, s->shape.n_u),
-                               longest(s, s->shape.ld_z + s->shape.n_u, s->shape.n_x));
+            leap->front =
+                fmax(longest_control(s), longest(s, s->shape.ld_z + s->shape.n_u, s->shape.n_x));
             double *const from = s->here.w;
             s->here.w = s->trial.w;
             s->trial.w = from;
