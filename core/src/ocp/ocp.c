@@ -149,8 +149,10 @@ static void spread_parameters(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32
             memcpy(out->hess_pu + i * n_u, by->pz + i * n_z + n_x, sizeof(double) * (size_t)n_u);
         }
     }
-    if (out->hess_pp != NULL && n_p > 0) {
-        mirror(by->pp, n_p, n_p, out->hess_pp);
+    for (int32_t i = 0; i < n_p && out->hess_pp != NULL; i++) {
+        for (int32_t j = 0; j <= i; j++) {
+            out->hess_pp[i * n_p + j] = out->hess_pp[j * n_p + i] = by->pp[i * n_p + j];
+        }
     }
 }
 
