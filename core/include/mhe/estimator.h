@@ -151,6 +151,7 @@ typedef struct mhe_estimator_info {
     int32_t n_joints;               /* that reactions are given of; 0: output.reactions is none */
     const char *const *joint_names; /* [n_joints] "hip_r_on_femur_r_in_femur_r": the joint, the
                                      * body it carries, whose axes */
+    int32_t uncertainty;            /* 1: estimates have standard deviations (q_sd ...) */
 } mhe_estimator_info;
 
 /* Row i of the table. [any] */

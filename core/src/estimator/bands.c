@@ -3,8 +3,6 @@
 
 #include <string.h>
 
-#define LONGEST_INSIDE 64 /* intervals of a window whose estimates are not the first node's */
-
 static mhe_status create_variants(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
     const mhi_uncertainty_section *c = b->config;
     mhe_status status = MHE_OK;
@@ -46,6 +44,12 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                   {&b->activation, b->n_m},
                   {&b->force_sd, b->n_m},
                   {&b->moment, b->n_q},
+                  {&b->moments[0].by_a, b->n_q * b->n_m},
+                  {&b->moments[0].by_q, b->n_q * b->n_q},
+                  {&b->moments[0].by_v, b->n_q * b->n_q},
+                  {&b->moments[1].by_a, b->n_q * b->n_m},
+                  {&b->moments[1].by_q, b->n_q * b->n_q},
+                  {&b->moments[1].by_v, b->n_q * b->n_q},
                   {&b->value, b->n_x},
                   {&b->slope, b->n_x + b->n_u}};
     for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
@@ -65,11 +69,11 @@ static mhe_status check(const mhe_estimator *e, mhe_error *err) {
                            "output.uncertainty: muscles with states of their own have none; "
                            "'muscle.tendon: rigid' has");
     }
-    if (e->node > 0 && e->window.n > LONGEST_INSIDE) {
+    if (e->node > 0 && e->window.n > MHI_GAIN_LONGEST) {
         return mhi_fail_at(err, MHE_E_CONFIG, e->run->tree, node,
                            "output.uncertainty: with more than %d intervals (horizon.window is %d) "
                            "only at 'output.node: first'",
-                           LONGEST_INSIDE, (int)e->window.n);
+                           MHI_GAIN_LONGEST, (int)e->window.n);
     }
     return MHE_OK;
 }
@@ -126,6 +130,13 @@ void mhi_bands_free(mhi_bands *b) {
 void mhi_bands_forget(mhi_bands *b) {
     if (b != NULL) {
         b->begun = b->gain.has_known = 0;
+    }
+}
+
+void mhi_bands_set_node(mhi_bands *b, int32_t node) {
+    if (b != NULL) {
+        b->gain.node = node;
+        b->gain.has_known = b->begun = 0;
     }
 }
 
@@ -189,34 +200,43 @@ static void add(double *to, const double *row, double factor, int32_t n) {
     }
 }
 
-/* Errors of forces and moments from those of the output's node, in b->at and b->controls. */
+/* Moments are held by the markers: the errors of the forces cancel in them. So they are measured
+ * where the answers were found, else what moved since would be all that is left. */
+static void measure_moments(mhi_bands *b) {
+    const int32_t n = b->gain.n_columns, n_q = b->n_q;
+    const mhi_bands_moments *by = &b->moments[0];
+    for (int32_t j = 0; j < n_q; j++) {
+        memset(b->row, 0, sizeof(double) * (size_t)n);
+        for (int32_t m = 0; m < b->n_m; m++) {
+            add(b->row, b->force_error + m * n, by->by_a[j * b->n_m + m], n);
+        }
+        for (int32_t i = 0; i < n_q; i++) {
+            add(b->row, b->at + i * n, by->by_q[j * n_q + i], n);
+            add(b->row, b->at + (n_q + i) * n, by->by_v[j * n_q + i], n);
+        }
+        b->moment[j] = length_of(b->row, n);
+    }
+}
+
+/* Standard deviations from the errors of the output's node, in b->at and b->controls. */
 static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state *muscles) {
     const int32_t n = b->gain.n_columns, n_q = b->n_q;
     for (int32_t j = 0; j < n_q; j++) {
         b->q[j] = length_of(b->at + j * n, n);
     }
-    for (int32_t m = 0; m < b->n_m; m++) {
+    for (int32_t m = 0; m < b->n_m; m++) { /* of the activation, and of the muscle's numbers */
         double *row = b->force_error + m * n;
         const double *a = activation_row(e, b, m);
         b->activation[m] = length_of(a, n);
-        memset(row, 0, sizeof(double) * (size_t)n);
-        add(row, a, muscles->force_a[m], n); /* of the activation, and of the muscle's numbers */
-        row[b->n_m + m] += muscles->force_a[m] * b->size[b->n_m + m];
-        memcpy(b->force_error + m * n, row, sizeof(double) * (size_t)n);
+        memcpy(row, a, sizeof(double) * (size_t)n);
+        row[b->n_m + m] += b->size[b->n_m + m];
     }
-    for (int32_t j = 0; j < n_q; j++) {
-        memset(b->row, 0, sizeof(double) * (size_t)n);
-        for (int32_t m = 0; m < b->n_m; m++) {
-            add(b->row, b->force_error + m * n, -muscles->length_q[m * n_q + j], n);
-        }
-        for (int32_t i = 0; i < n_q; i++) {
-            add(b->row, b->at + i * n, muscles->moment_q[j * n_q + i], n);
-            add(b->row, b->at + (n_q + i) * n, muscles->moment_v[j * n_q + i], n);
-        }
-        b->moment[j] = length_of(b->row, n);
-    }
+    measure_moments(b);
     for (int32_t m = 0; m < b->n_m; m++) {
         double *row = b->force_error + m * n;
+        for (int32_t i = 0; i < n; i++) {
+            row[i] *= muscles->force_a[m];
+        }
         for (int32_t i = 0; i < n_q; i++) {
             add(row, b->at + i * n, muscles->force_q[m * n_q + i], n);
             add(row, b->at + (n_q + i) * n, muscles->force_v[m * n_q + i], n);
@@ -237,6 +257,11 @@ static void renew(mhe_estimator *e, mhi_bands *b) {
         }
         const int32_t done = mhi_gain_go_on(&b->gain);
         at_work = done == 0;
+        if (done > 0) {
+            const mhi_bands_moments swap = b->moments[0];
+            b->moments[0] = b->moments[1];
+            b->moments[1] = swap;
+        }
         if (done < 0) {
             b->gain.stage = -1;
             b->gain.forward = b->gain.node;
@@ -259,7 +284,7 @@ void mhi_bands_give(mhe_estimator *e, int32_t k, mhe_estimate *out) {
     mhi_bands *b = e->bands;
     mhi_muscle_state muscles;
     mhe_system_point at;
-    if (b == NULL) {
+    if (b == NULL || (b->gain.node > 0 && !b->gain.whole)) {
         return;
     }
     renew(e, b);

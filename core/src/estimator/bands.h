@@ -21,6 +21,9 @@ typedef struct mhi_bands mhi_bands;
  */
 mhe_status mhi_bands_create(mhe_estimator *e, mhi_bands **bands, mhe_error *err);
 void mhi_bands_free(mhi_bands *bands);
+/* Other estimates are given: before the first. NULL is fine. Without room for them (a long window)
+ * none has bands. */
+void mhi_bands_set_node(mhi_bands *bands, int32_t node);
 /* The window begins anew: nothing is known of earlier ones. NULL is fine. */
 void mhi_bands_forget(mhi_bands *bands);
 /* Of the window just solved, whose node k is given out; goes on to the next. NULL is fine. [hot] */

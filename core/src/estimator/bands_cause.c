@@ -8,6 +8,7 @@
 
 #define MEMORY 500.0  /* frames that the level of EMG's noise is learnt over */
 #define PATIENCE 10.0 /* frames' worth of belief in what the config says of it */
+#define QUIET 0.02    /* channels that vary less than that tell little */
 #define UNKNOWN 0.1   /* variation of a channel that is not known yet */
 
 /* Next state by an error of a muscle's force that stays over the interval, in units of activation:
@@ -76,6 +77,27 @@ static void postures_of(mhe_estimator *e, mhi_bands *b, int32_t k) {
     }
 }
 
+/* Joint moments around node k. */
+static int32_t moments_of(mhe_estimator *e, mhi_bands *b, int32_t k) {
+    const int32_t n_q = b->n_q;
+    mhi_bands_moments *to = &b->moments[1];
+    mhi_muscle_state muscles;
+    mhe_system_point at;
+    mhi_system_point(e->system, mhi_row(e->window.solution.x, k, b->n_x),
+                     mhi_row(e->window.solution.u, k, b->n_u), NULL, &at);
+    if (mhi_system_muscles(mhi_ocp_context(e->ocp), &at, 1, &muscles, NULL) != MHE_OK) {
+        return 0;
+    }
+    memcpy(to->by_q, muscles.moment_q, sizeof(double) * (size_t)(n_q * n_q));
+    memcpy(to->by_v, muscles.moment_v, sizeof(double) * (size_t)(n_q * n_q));
+    for (int32_t j = 0; j < n_q; j++) {
+        for (int32_t m = 0; m < b->n_m; m++) {
+            to->by_a[j * b->n_m + m] = -muscles.length_q[m * n_q + j] * muscles.force_a[m];
+        }
+    }
+    return 1;
+}
+
 int32_t mhi_bands_expand(mhe_estimator *e, mhi_bands *b) {
     const int32_t k = e->node > 0 && e->node < e->window.n ? e->node : 1;
     mhi_gain_node *here = &b->gain.here;
@@ -100,7 +122,7 @@ int32_t mhi_bands_expand(mhe_estimator *e, mhi_bands *b) {
     for (int32_t m = 0; m < b->n_m; m++) { /* what holds a control is its EMG */
         here->control[m] = -here->hess_uu[m * b->n_u + m];
     }
-    return 1;
+    return moments_of(e, b, k);
 }
 
 /* EMG of node k, where it is believed, NaN where not. */
@@ -170,7 +192,7 @@ void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
     double seen = 0, noise = 0, others = 0;
     for (int32_t m = 0; m < b->n_m && emg != NULL; m++) {
         const double *row = b->controls + (ptrdiff_t)m * b->gain.n_columns;
-        const double scale = variation_of(spread, m);
+        const double scale = variation_of(spread, m) + QUIET;
         if (isnan(emg[m])) {
             continue;
         }
@@ -192,6 +214,7 @@ void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
     l->noise = keep * l->noise + noise;
     l->others = keep * l->others + others;
     l->frames++;
-    const double prior = PATIENCE * l->noise / l->frames;
-    l->level = sqrt(fmax(1e-4, (prior + l->seen - l->others) / (prior + l->noise)));
+    /* What the other causes may do says nothing of the noise: it holds on to level 1. */
+    const double held = PATIENCE * l->noise / l->frames + l->others;
+    l->level = sqrt((held + fmax(0, l->seen - l->others)) / (held + l->noise));
 }

@@ -19,7 +19,13 @@ typedef struct mhi_emg_level {
     int32_t frames; /* so far */
 } mhi_emg_level;
 
+/* Joint moments by activations [n_q x n_m], q and v [n_q x n_q]. */
+typedef struct mhi_bands_moments {
+    double *by_a, *by_q, *by_v;
+} mhi_bands_moments;
+
 struct mhi_bands {
+    mhi_bands_moments moments[2]; /* where the known answers were found; of the sweep in work */
     const mhi_uncertainty_section *config;
     mhi_gain gain;
     mhi_variant *variants[MHI_N_VARIANTS]; /* NULL: that number is known */

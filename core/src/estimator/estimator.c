@@ -323,6 +323,7 @@ void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
 
 void mhi_estimator_set_node(mhe_estimator *e, int32_t node) {
     e->node = node;
+    mhi_bands_set_node(e->bands, node);
 }
 
 void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {

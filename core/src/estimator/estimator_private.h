@@ -59,7 +59,7 @@ struct mhe_estimator {
     mhi_rates rates;
     mhi_pace pace;
     mhi_output output;
-    mhi_bands *bands; /* NULL: not wanted */
+    mhi_bands *bands;     /* NULL: not wanted */
     const double **given; /* [channels] what the frame in work says, scratch */
     mhi_arena arena;
 };

@@ -14,7 +14,7 @@ static void set_zero(double *array, ptrdiff_t n) {
 
 mhe_status mhi_gain_create(mhi_gain *g, mhi_arena *arena, mhe_error *err) {
     const int32_t n_x = g->n_x, n_u = g->n_u, n_q = g->n_q, n_m = g->n_m;
-    g->whole = g->horizon <= LONGEST || g->node > 0;
+    g->whole = g->horizon <= LONGEST || (g->node > 0 && g->horizon <= MHI_GAIN_LONGEST);
     g->horizon = g->whole ? g->horizon : LONGEST;
     g->fixed = 2 * n_m;
     g->fresh = g->fixed + n_q;

@@ -17,6 +17,8 @@
 #include "base/arena.h"
 #include "base/product.h"
 
+#define MHI_GAIN_LONGEST 64 /* intervals of a window whose output is not the first node's */
+
 /* Filled by the caller before a sweep begins. All of one node, row-major. */
 typedef struct mhi_gain_node {
     double *A, *B;                   /* [n_x x n_x], [n_x x n_u] */

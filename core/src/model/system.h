@@ -119,9 +119,9 @@ typedef struct mhi_muscle_state {
 mhe_status mhi_system_muscles(mhi_system_context *context, const mhe_system_point *at,
                               int32_t derivatives, mhi_muscle_state *out, mhe_error *err);
 
-/* The same muscles with other numbers: max_isometric_force times `force`, optimal_fiber_length times
- * `fiber`, tendon_slack_length times `tendon` plus `path` (m). Rigid tendons only. MHE_E_INPUT: the
- * muscle plugin refuses one. [cold] */
+/* The same muscles with other numbers: max_isometric_force times `force`, optimal_fiber_length
+ * times `fiber`, tendon_slack_length times `tendon` plus `path` (m). Rigid tendons only.
+ * MHE_E_INPUT: the muscle plugin refuses one. [cold] */
 typedef struct mhi_variation {
     double force, fiber, tendon, path;
 } mhi_variation;
