@@ -133,13 +133,9 @@ static double model_cost_p(rti_solver *s) {
     }
     for (int32_t k = 0; k <= shape->N; k++) {
         const qp_stage *stage = &s->here.stages[k];
-        shape->kernels->add(shape->n_p, shape->n_z, 1, stage->C, shape->ld_z,
-                            row_z(shape, s->slope, k), slope);
+        qp_add_costs_p(shape, stage, row_z(shape, s->slope, k), step, 0.5, slope);
         for (int32_t i = 0; i < shape->n_p; i++) {
             slope[i] += stage->d[i];
-            for (int32_t j = 0; j < shape->n_p; j++) {
-                slope[i] += 0.5 * stage->D[i * shape->n_p + j] * step[j];
-            }
         }
     }
     for (int32_t i = 0; i < shape->n_p; i++) {

@@ -305,14 +305,24 @@ static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
 typedef struct counter {
     mhi_calibration *c;
     int32_t done, limit; /* iterations before this solve; of this solve, at most */
+    double last;         /* objective of the iteration before */
+    int32_t still;       /* iterations in a row that changed it by less than the tolerance */
 } counter;
 
+#define STILL 2         /* of those, and it has come to rest */
+#define NEARLY_MET 0.05 /* largest violation of the optimality conditions there */
+
 static int32_t count(void *data, int32_t iteration, double objective, double kkt) {
-    const counter *n = data;
+    counter *n = data;
     const mhi_calibration *c = n->c;
+    if (iteration > 0) {
+        const int32_t rests = fabs(n->last - objective) <= c->plan.tolerance * objective;
+        n->still = rests && kkt < NEARLY_MET ? n->still + 1 : 0;
+    }
+    n->last = objective;
     const int32_t stop = c->progress != NULL && iteration > 0 &&
                          c->progress(c->data, n->done + iteration, objective, kkt);
-    return stop || iteration >= n->limit || n->done + iteration >= c->plan.max_iterations;
+    return stop || n->still >= STILL || iteration >= n->limit || n->done + iteration >= c->plan.max_iterations;
 }
 
 /* Bounds of the region about p; 1: p itself is at one that is no bound of the parameter's. */
@@ -366,11 +376,12 @@ static mhe_status find_solution(mhi_calibration *c, problem *p, mhe_error *err) 
     if (status == MHE_OK) { /* without a region */
         set_region(c, p, INFINITY, lower, upper);
         n.limit = c->plan.max_iterations;
+        n.still = 0;
         status = p->solver->solve(p->self, &control, &p->s, &c->info, err);
         c->info.iterations += n.done;
     }
     if (status == MHE_OK && c->info.outcome == MHE_SOLVE_INTERRUPTED) {
-        c->info.outcome = MHE_SOLVE_ITERATION_LIMIT;
+        c->info.outcome = n.still >= STILL ? MHE_SOLVE_CONVERGED : MHE_SOLVE_ITERATION_LIMIT;
     }
     return status;
 }
@@ -403,9 +414,9 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     return status;
 }
 
-mhe_status mhi_calibration_open(mhi_run *run, const mhe_host *host, mhi_calibration *c,
-                                mhe_error *err) {
-    *c = (mhi_calibration){.run = run, .host = host};
+mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_host *host,
+                                mhi_calibration *c, mhe_error *err) {
+    *c = (mhi_calibration){.run = run, .start = start, .host = host};
     mhe_status status = mhi_plan_read(run, &c->plan, err);
     if (status == MHE_OK) {
         status = mhi_estimator_read_model(run, host, &c->model, err);
