@@ -18,7 +18,7 @@
 #include <string.h>
 
 #define MOST_SETS 8
-#define MANY_SETS 40 /* of whole recordings with parameters */
+#define MANY_SETS 20 /* of whole recordings with parameters */
 #define MOST_CORRECTIONS 3
 
 /* What lies in the way of a look at all variables. */
@@ -252,6 +252,8 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
         }
         if (l.changes == 0) {
             result = is_good(&l, limits) ? QP_SOLVED : -1;
+        } else if (l.changes <= limits->unsettled) {
+            result = QP_SOLVED;
         }
     }
     if (result == QP_LATE && q->iterations > 0) {

@@ -322,7 +322,8 @@ static int32_t count(void *data, int32_t iteration, double objective, double kkt
     n->last = objective;
     const int32_t stop = c->progress != NULL && iteration > 0 &&
                          c->progress(c->data, n->done + iteration, objective, kkt);
-    return stop || n->still >= STILL || iteration >= n->limit || n->done + iteration >= c->plan.max_iterations;
+    return stop || n->still >= STILL || iteration >= n->limit ||
+           n->done + iteration >= c->plan.max_iterations;
 }
 
 /* Bounds of the region about p; 1: p itself is at one that is no bound of the parameter's. */
