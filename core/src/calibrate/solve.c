@@ -231,6 +231,27 @@ static mhe_status take_solution(mhi_calibration *c, problem *p, mhe_error *err) 
     return MHE_OK;
 }
 
+/* Bounds of a node. Activations follow excitations that have bounds, so that behind a first node
+ * their own say nothing new, and cost a program most of its search for those that hold. */
+static void set_bounds(const mhi_calibration *c, const mhe_layout *layout, int32_t k,
+                       mhi_ocp *ocp) {
+    int32_t is_first = 0;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        is_first |= c->motions[i].first == k;
+    }
+    const mhe_block *a = mhe_layout_find(layout, MHE_ROLE_STATE, "activation");
+    double *lower = mhi_ocp_x_lower(ocp, k), *upper = mhi_ocp_x_upper(ocp, k);
+    mhi_layout_bounds(layout, MHE_ROLE_STATE, lower, upper);
+    for (int32_t i = 0; a != NULL && i < a->count && !is_first; i++) {
+        lower[a->first + i] = -INFINITY;
+        upper[a->first + i] = INFINITY;
+    }
+    if (k < c->n_intervals) {
+        mhi_layout_bounds(layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(ocp, k),
+                          mhi_ocp_u_upper(ocp, k));
+    }
+}
+
 /* Targets, bounds and the start. */
 static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_stage_problem *f = mhi_ocp_face(p->ocp);
@@ -238,12 +259,7 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
     mhi_junction junction;
     mhe_status status = take_solution(c, p, err);
     for (int32_t k = 0; k <= f->n_intervals && status == MHE_OK; k++) {
-        mhi_layout_bounds(layout, MHE_ROLE_STATE, mhi_ocp_x_lower(p->ocp, k),
-                          mhi_ocp_x_upper(p->ocp, k));
-        if (k < f->n_intervals) {
-            mhi_layout_bounds(layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(p->ocp, k),
-                              mhi_ocp_u_upper(p->ocp, k));
-        }
+        set_bounds(c, layout, k, p->ocp);
     }
     for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
         const mhi_motion *m = &c->motions[i];
