@@ -263,6 +263,9 @@ static void rk_keep(const struct rk_context *c, const double *r, double h) {
     for (int32_t i = 0; i < system->n_r; i++) {
         at->r[i] = r[i];
     }
+    for (int32_t i = 0; i < system->n_w; i++) {
+        at->w[i] = c->w[i];
+    }
     memcpy(at->stage_a, c->stage_a, sizeof(double) * (size_t)(s * system->n_m));
     memcpy(at->K, c->K, sizeof(double) * (size_t)(s * n_q));
     if (system->n_z > 0) {
@@ -337,6 +340,14 @@ static mhe_status rk_linearise(struct rk_context *c, const double *r, double h, 
     return status;
 }
 
+/* Whether the size of the move tells all that can have changed: inputs are compared, parameters
+ * have other values without a word. */
+static int rk_is_kept_whole(const struct rk_context *c) {
+    const mhe_system *system = c->rk->system;
+    return system->n_z == 0 && system->n_p == 0 &&
+           (system->n_w == 0 || memcmp(c->w, c->kept.w, sizeof(double) * (size_t)system->n_w) == 0);
+}
+
 /* Stages behind a move from the memory. The Jacobian there is off by the order of the move, and so
  * is what a simplified iteration leaves. */
 static mhe_status rk_move_on(struct rk_context *c, const double *r, double h, double moved,
@@ -347,7 +358,7 @@ static mhe_status rk_move_on(struct rk_context *c, const double *r, double h, do
         return rk_newton(c, r, h, RK_JACOBIAN_KEPT, fmin(1, moved), c->rk->config.newton_tolerance,
                          err);
     }
-    if (moved < RK_UNMOVED && c->rk->system->n_z == 0) {
+    if (moved < RK_UNMOVED && rk_is_kept_whole(c)) {
         return MHE_OK;
     }
     if (RK_BENT * moved * moved > RK_LAST && c->rk->system->n_z == 0) {

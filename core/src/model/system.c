@@ -373,6 +373,12 @@ mhe_status mhi_system_markers(mhi_system_context *c, const double *q, double *ma
     return c->system->model->kinematics(c->model, q, c->zero, &out, err);
 }
 
+mhe_status mhi_system_bodies(mhi_system_context *c, const double *q, double *body, double *body_q,
+                             mhe_error *err) {
+    const mhe_kinematics out = {.size = sizeof out, .body = body, .body_q = body_q};
+    return c->system->model->kinematics(c->model, q, c->zero, &out, err);
+}
+
 const double *mhi_system_activation(const mhi_system *s, const double *x, const double *u) {
     const mhe_block *block = mhe_layout_find(&s->layout, MHE_ROLE_STATE, "activation");
     return block != NULL ? x + block->first : u;
@@ -381,7 +387,7 @@ const double *mhi_system_activation(const mhi_system *s, const double *x, const 
 void mhi_system_point(const mhi_system *s, const double *x, const double *u, const double *w,
                       mhe_system_point *point) {
     const mhe_system *f = &s->face;
-    const double *d = x + 2 * f->n_q;
+    const double *d = x + f->first_d;
     *point = (mhe_system_point){.size = sizeof *point,
                                 .q = x,
                                 .v = x + f->n_q,
