@@ -12,7 +12,8 @@
 
 #define WIDTH 300.0
 #define HEIGHT 120.0
-#define POINTS 600 /* of a line; more would not be seen */
+#define POINTS 600   /* of a line; more would not be seen */
+#define PRINTED 1e-4 /* of the smallest axis: less is printed as 0 */
 
 static double value_at(const rows *t, int32_t row, int32_t column, double scale) {
     return scale * t->is.values[(ptrdiff_t)row * t->is.n_columns + column];
