@@ -17,8 +17,8 @@ typedef struct qp_limits { /* largest residuals of a solved program */
     double stationarity, feasibility, complementarity;
     int32_t max_iterations;
     double regularisation;
-    int32_t (*is_late)(void *data); /* asked before each iteration; NULL: never */
-    void *data;
+    int32_t (*is_late)(const void *data); /* asked before each iteration; NULL: never */
+    const void *data;
 } qp_limits;
 
 #define QP_SOLVED 0

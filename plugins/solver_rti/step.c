@@ -22,8 +22,8 @@ int32_t rti_is_spent(rti_solver *s) {
 }
 
 /* Before each iteration of a program, too. */
-static int32_t is_late(void *data) {
-    rti_solver *s = data;
+static int32_t is_late(const void *data) {
+    rti_solver *s = (rti_solver *)data; /* whose count of solutions is told */
     return rti_is_spent(s) || (isfinite(s->deadline) && rti_now() >= s->deadline);
 }
 
