@@ -18,8 +18,10 @@
 #include <string.h>
 
 #define MOST_SETS 8
-#define MANY_SETS 40 /* of whole recordings with parameters */
+#define MANY_SETS 20 /* of whole recordings with parameters */
 #define MOST_CORRECTIONS 3
+#define NEAR_BOUNDS \
+    1e-4 /* of a set that is taken before it settles: multipliers are HOLD times it */
 
 /* What lies in the way of a look at all variables. */
 typedef struct look {
@@ -47,9 +49,7 @@ static void guess_one(qp *q, ptrdiff_t at) {
     if (q->fixed[at]) {
         return;
     }
-    if (active_is_equality(q, at)) {
-        q->side[at] = -1;
-    } else if (below > above && below > q->w[at] - q->lower[at]) {
+    if (active_is_equality(q, at) || (below > above && below > q->w[at] - q->lower[at])) {
         q->side[at] = -1;
     } else if (above > below && above > q->upper[at] - q->w[at]) {
         q->side[at] = 1;
@@ -252,6 +252,8 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
         }
         if (l.changes == 0) {
             result = is_good(&l, limits) ? QP_SOLVED : -1;
+        } else if (l.changes <= limits->unsettled && l.feasibility <= NEAR_BOUNDS) {
+            result = QP_SOLVED;
         }
     }
     if (result == QP_LATE && q->iterations > 0) {
