@@ -302,7 +302,7 @@ double rti_first_gap(rti_solver *s, const double *w) {
     const int32_t known = status == MHE_OK && finiteness(of->x_next, s->shape.n_x) == 0;
     double gap = known ? 0 : INFINITY;
     for (int32_t i = 0; known && i < s->shape.n_x; i++) {
-        gap = fmax(gap, fabs(of->x_next[i] - next[i]));
+        gap = larger(gap, fabs(of->x_next[i] - next[i]));
     }
     s->seconds += rti_now() - start;
     s->failure = status < 0 ? status : MHE_OK;
@@ -393,9 +393,9 @@ static void add_variable(const rti_solver *s, const rti_point *point, ptrdiff_t 
         return; /* its multiplier bears any slope */
     }
     const double below = z_lower[at], above = z_upper[at], w = point->w[at];
-    r->stationarity = fmax(r->stationarity, fabs(s->slope[at] - below + above));
-    r->complementarity = fmax(r->complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
-    r->complementarity = fmax(r->complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
+    r->stationarity = larger(r->stationarity, fabs(s->slope[at] - below + above));
+    r->complementarity = larger(r->complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
+    r->complementarity = larger(r->complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
 }
 
 rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const double *lambda,
@@ -407,7 +407,7 @@ rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const doub
             add_variable(s, point, (ptrdiff_t)k * s->shape.ld_z + i, z_lower, z_upper, &r);
         }
         for (int32_t i = 0; k < s->shape.N && i < s->shape.n_x; i++) {
-            r.gap = fmax(r.gap, fabs(point->stages[k].b[i]));
+            r.gap = larger(r.gap, fabs(point->stages[k].b[i]));
         }
     }
     for (int32_t i = 0; i < s->shape.n_p; i++) {

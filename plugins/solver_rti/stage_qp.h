@@ -16,6 +16,14 @@
 
 #include <mhe/solver.h>
 
+/* Of two numbers, `a` where b is NaN: without the calls that fmax and fmin are. */
+static inline double larger(double a, double b) {
+    return b > a ? b : a;
+}
+static inline double smaller(double a, double b) {
+    return b < a ? b : a;
+}
+
 typedef struct qp_shape {
     int32_t N, n_x, n_u, n_z; /* n_z = n_u + n_x */
     int32_t ld_z, ld_x;

@@ -73,7 +73,7 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
 static void reach(rti_solver *s, double length) {
     for (size_t i = 0; i < size_z(&s->shape); i++) {
         const double w = s->here.w[i] + length * s->qp.w[i];
-        s->trial.w[i] = fmin(fmax(w, s->lower[i]), s->upper[i]);
+        s->trial.w[i] = smaller(s->upper[i], larger(s->lower[i], w));
     }
 }
 
@@ -81,7 +81,7 @@ static void reach(rti_solver *s, double length) {
 static double longest(const rti_solver *s, int32_t from, int32_t n) {
     double length = 0;
     for (int32_t i = from; i < from + n; i++) {
-        length = fmax(length, fabs(s->trial.w[i] - s->here.w[i]));
+        length = larger(length, fabs(s->trial.w[i] - s->here.w[i]));
     }
     return length;
 }
@@ -181,7 +181,7 @@ static double model_gaps(rti_solver *s, double *sum) {
             qp_forward_p(shape, &s->here.stages[k], row_p(shape, s->slope), gap);
         }
         for (int32_t i = 0; i < shape->n_x; i++) {
-            largest = fmax(largest, fabs(gap[i]));
+            largest = larger(largest, fabs(gap[i]));
             *sum += fabs(gap[i]);
         }
     }
@@ -192,7 +192,7 @@ static double model_gaps(rti_solver *s, double *sum) {
 static double largest_multiplier(const rti_solver *s) {
     double largest = 0;
     for (size_t i = 0; i < size_x(&s->shape); i++) {
-        largest = fmax(largest, fabs(s->qp.lambda[i]));
+        largest = larger(largest, fabs(s->qp.lambda[i]));
     }
     return largest;
 }
