@@ -42,7 +42,7 @@ formulation: excitation
 horizon: {window: 7, ratio: 3}
 bounds: {residual_torques: true}
 integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03, activation_step: 3.4}
-costs: [{plugin: mhe.cost.emg-markers, markers: 0.001, %s}]
+costs: [{plugin: mhe.cost.emg-markers, markers: 0.001, markers_misfit: 0, %s}]
 data: {marker_outlier: 0}
 solver: {plugin: mhe.solver.rti, preset: robust, tolerance: 1e-4, max_iterations: 50}
 calibrate:
