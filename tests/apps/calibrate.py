@@ -195,6 +195,17 @@ def test_wrong_input():
     expect("twice", CONFIG.replace("[BRA, Deltoid2]", "[BRA, BRA]"), "bad.yaml:14", "BRA", "twice")
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
     expect("nothing to learn from", CONFIG.replace("reference.sto}", "reference.sto, hold_out: true}"), "bad.yaml", "learn")
+    with open("B/markers.trc") as file:  # another person's forearm: the last two markers 20 % farther from the one before
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+    for i in range(head, len(lines)):
+        cells = lines[i].split("\t")
+        for j in range(3 * 6 + 2, min(3 * 8 + 2, len(cells))):
+            middle = 3 * 5 + 2 + (j - 2) % 3
+            cells[j] = "%.6f" % (float(cells[middle]) + 1.2 * (float(cells[j]) - float(cells[middle])))
+        lines[i] = "\t".join(cells)
+    write("other.trc", "\n".join(lines))
+    expect("two persons", CONFIG.replace("B/markers.trc", "other.trc"), "other.trc", "apart", "one person")
     expect("absent", CONFIG.replace("A_emg.sto", "A_gme.sto"), "A_gme.sto")
 
 
