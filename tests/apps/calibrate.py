@@ -175,6 +175,28 @@ def test_told():
     assert rows["max_isometric_force of BRA"]["verdict"] == "at bound", rows
 
 
+def test_channels():
+    """An electrode that was off and an MVC that was no maximum are told by the muscle's name; the calibration goes on."""
+    with open("B_emg.sto") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+    labels = [re.sub("^e_", "", label) for label in lines[head].split("\t")]
+    for i in range(head + 1, len(lines)):
+        cells = lines[i].split("\t")
+        if len(cells) == len(labels):
+            cells[labels.index("SubScap")] = "0.2"
+            cells[labels.index("BRD")] = "%.6g" % (8 * float(cells[labels.index("BRD")]))
+            lines[i] = "\t".join(cells)
+    write("B_odd.sto", "\n".join(lines))
+    write("odd.yaml", CONFIG.replace("B_emg", "B_odd"))
+    done = run(CALIBRATE, "odd.yaml", "--out", "odd", "--set", "calibrate.max_iterations=1")
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.split("\n")
+    assert any("B_odd.sto: the same value" in line and "SubScap" in line for line in lines), lines
+    told = [line for line in lines if "times its MVC" in line]
+    assert len(told) == 1 and told[0].startswith("EMG of BRD reaches 1.20 times its MVC"), told
+
+
 def expect(what, config, *words):
     write("bad.yaml", config)
     done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
@@ -219,6 +241,7 @@ def main():
         test_finds()
         test_solvers_agree()
         test_told()
+        test_channels()
         test_wrong_input()
 
 
