@@ -93,10 +93,28 @@ static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run *
     return status;
 }
 
-static const char *file_of(const mhi_plan_recording *r) {
-    const char *path = r->markers != NULL ? r->markers : r->angles != NULL ? r->angles : r->emg;
-    const char *slash = path == NULL ? NULL : strrchr(path, '/');
-    return slash == NULL ? path : slash + 1;
+static const char *path_of(const mhi_plan_recording *r) {
+    return r->markers != NULL ? r->markers : r->angles != NULL ? r->angles : r->emg;
+}
+
+/* What stands behind the last `n` slashes of a path. */
+static const char *behind(const char *path, int32_t n) {
+    const char *at = path + strlen(path);
+    while (at > path && (at[-1] != '/' || --n > 0)) {
+        at--;
+    }
+    return at;
+}
+
+/* A recording's file, with its folder where another one has the same name. */
+static const char *file_of(const mhi_plan *plan, int32_t i) {
+    const char *path = path_of(&plan->recordings[i]);
+    int32_t same = 0;
+    for (int32_t k = 0; k < plan->n_recordings && path != NULL; k++) {
+        const char *other = path_of(&plan->recordings[k]);
+        same += other != NULL && strcmp(behind(path, 1), behind(other, 1)) == 0;
+    }
+    return path == NULL ? "" : behind(path, same > 1 ? 2 : 1);
 }
 
 /* Each recording with the config as it was and with that of the person. */
@@ -106,7 +124,7 @@ static mhe_status compare(const arguments *a, const mhi_calibration *c, const ch
     for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
         const mhi_plan_recording *r = &c->plan.recordings[i];
         report_recording *one = &list[i];
-        *one = (report_recording){.name = file_of(r), .held_out = r->hold_out};
+        *one = (report_recording){.name = file_of(&c->plan, i), .held_out = r->hold_out};
         status = held_out_measure(a->config, r, c->host, &one->before, err);
         if (status == MHE_OK) {
             status = held_out_measure(person, r, c->host, &one->after, err);

@@ -33,6 +33,28 @@ static void find_in(const mhi_estimated *e, mhi_text *out) {
     }
 }
 
+#define ABOVE_MVC 1.05 /* what a sample may reach by noise alone */
+
+/* EMG beyond the maximum that it was divided by. */
+static void find_in_emg(const mhi_calibration *c, mhi_text *out) {
+    const int32_t n_m = c->model->n_muscles;
+    for (int32_t m = 0; m < n_m; m++) {
+        double most = 0;
+        for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+            const mhi_recording *r = c->motions[i].recording;
+            for (int32_t k = 0; r->emg != NULL && k < r->n_frames; k++) {
+                most = fmax(most, r->emg[(ptrdiff_t)k * n_m + m]);
+            }
+        }
+        if (most > ABOVE_MVC) {
+            mhi_text_add(out,
+                         "EMG of %s reaches %.2f times its MVC, which was no maximum: without an "
+                         "emg_gain for it, forces are too large\n",
+                         c->model->muscles[m].name, most);
+        }
+    }
+}
+
 void report_findings(report_content *r) {
     const mhi_calibration *c = r->c;
     if (c->info.outcome != MHE_SOLVE_CONVERGED) {
@@ -41,6 +63,7 @@ void report_findings(report_content *r) {
                      "calibrate.max_iterations may help\n",
                      report_outcome(c), (int)c->info.iterations);
     }
+    find_in_emg(c, &r->findings);
     for (int32_t i = 0; i < c->n; i++) {
         find_in(&c->list[i], &r->findings);
     }

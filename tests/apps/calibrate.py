@@ -92,7 +92,8 @@ def test_finds():
         told = json.load(file)
     assert told["outcome"] == "converged", told["outcome"]
     held_out = [r for r in told["recordings"] if r["held_out"]]
-    assert len(held_out) == 1 and len(told["recordings"]) == 3
+    assert [r["name"] for r in told["recordings"]] == ["A/markers.trc", "B/markers.trc", "C/markers.trc"]
+    assert len(held_out) == 1
     before, after = held_out[0]["before"]["force_n"], held_out[0]["after"]["force_n"]
     assert after < 0.2 * before, "forces %g N before, %g N after" % (before, after)
     with open("out/parameters.csv") as file:
@@ -119,6 +120,83 @@ def test_finds():
     assert done.returncode == 0, done.stderr
 
 
+def test_solvers_agree():
+    """The bordered recursion against Ipopt on a short recording whose controls stay off their bounds (where Ipopt's are relaxed)."""
+    found = []
+    recording = "    - {markers: B/markers.trc, emg: B_emg.sto, reference: B/reference.sto}\n"
+    config = re.sub(r"    - \{markers: [AC].*\n", "", CONFIG)
+    assert recording in config
+    write("agree.yaml", config)
+    for solver in ("rti", "ipopt"):
+        done = run(CALIBRATE, "agree.yaml", "--out", solver, "--quiet", "--set", "calibrate.solver=" + solver, "--set",
+                   "calibrate.tolerance=1e-12", "--set", "calibrate.max_iterations=200")
+        assert done.returncode == 0, done.stderr
+        with open(solver + "/calibration.json") as file:
+            told = json.load(file)
+        assert told["outcome"] == "converged", (solver, told["outcome"])
+        found.append(told["parameters"])
+    moved = [abs(one["after"] - one["before"]) for one in found[0]]
+    off = max(abs(one["after"] - other["after"]) for one, other in zip(*found))
+    assert max(moved) > 0.1 and off < 1e-6, (moved, off)
+
+
+def drop_columns(path, to, names):
+    with open(path) as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+    labels = lines[head].split("\t")
+    keep = [i for i, label in enumerate(labels) if re.sub("^e_", "", label) not in names]
+    lines[:head] = [re.sub("nColumns=.*", "nColumns=%d" % len(keep), line) for line in lines[:head]]
+    cut = ["\t".join(line.split("\t")[i] for i in keep) for line in lines[head:] if line]
+    write(to, "\n".join(lines[:head] + cut) + "\n")
+
+
+def test_told():
+    """What the recordings say nothing about, and what they say against what was expected, is told by name."""
+    for motion in "AB":
+        drop_columns(motion + "_emg.sto", motion + "_less.sto", ["Latissimus1"])
+    config = CONFIG.replace("A_emg", "A_less").replace("B_emg", "B_less").split("    - {markers: C")[0] + """  parameters:
+    - {name: emg_gain, sd: 0.25, muscles: [Latissimus1]}
+    - {name: max_isometric_force, sd: 0.02, muscles: [TricepsLong]}
+    - {name: max_isometric_force, upper: 1.01, muscles: [BRA]}
+"""
+    write("told.yaml", config)
+    done = run(CALIBRATE, "told.yaml", "--out", "told")
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stderr.split("\n") if " of " in line and "warning" not in line]
+    assert any(line.startswith("emg_gain of Latissimus1: not informed") for line in lines), lines
+    assert any("max_isometric_force of TricepsLong: the data contradict" in line for line in lines), lines
+    assert any("max_isometric_force of BRA stands at its bound, 1.01" in line for line in lines), lines
+    with open("told/parameters.csv") as file:
+        rows = {row["parameter"]: row for row in csv.DictReader(file)}
+    row = rows["emg_gain of Latissimus1"]
+    assert row["verdict"] == "not informed" and abs(float(row["after"]) - 1) < 1e-3, row
+    assert abs(float(row["sd"]) - 0.25) < 1e-3, row
+    assert rows["max_isometric_force of BRA"]["verdict"] == "at bound", rows
+
+
+def test_channels():
+    """An electrode that was off and an MVC that was no maximum are told by the muscle's name; the calibration goes on."""
+    with open("B_emg.sto") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+    labels = [re.sub("^e_", "", label) for label in lines[head].split("\t")]
+    for i in range(head + 1, len(lines)):
+        cells = lines[i].split("\t")
+        if len(cells) == len(labels):
+            cells[labels.index("SubScap")] = "0.2"
+            cells[labels.index("BRD")] = "%.6g" % (8 * float(cells[labels.index("BRD")]))
+            lines[i] = "\t".join(cells)
+    write("B_odd.sto", "\n".join(lines))
+    write("odd.yaml", CONFIG.replace("B_emg", "B_odd"))
+    done = run(CALIBRATE, "odd.yaml", "--out", "odd", "--set", "calibrate.max_iterations=1")
+    assert done.returncode == 0, done.stderr
+    lines = done.stderr.split("\n")
+    assert any("B_odd.sto: the same value" in line and "SubScap" in line for line in lines), lines
+    told = [line for line in lines if "times its MVC" in line]
+    assert len(told) == 1 and told[0].startswith("EMG of BRD reaches 1.20 times its MVC"), told
+
+
 def expect(what, config, *words):
     write("bad.yaml", config)
     done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
@@ -139,6 +217,17 @@ def test_wrong_input():
     expect("twice", CONFIG.replace("[BRA, Deltoid2]", "[BRA, BRA]"), "bad.yaml:14", "BRA", "twice")
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
     expect("nothing to learn from", CONFIG.replace("reference.sto}", "reference.sto, hold_out: true}"), "bad.yaml", "learn")
+    with open("B/markers.trc") as file:  # another person's forearm: the last two markers 20 % farther from the one before
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+    for i in range(head, len(lines)):
+        cells = lines[i].split("\t")
+        for j in range(3 * 6 + 2, min(3 * 8 + 2, len(cells))):
+            middle = 3 * 5 + 2 + (j - 2) % 3
+            cells[j] = "%.6f" % (float(cells[middle]) + 1.2 * (float(cells[j]) - float(cells[middle])))
+        lines[i] = "\t".join(cells)
+    write("other.trc", "\n".join(lines))
+    expect("two persons", CONFIG.replace("B/markers.trc", "other.trc"), "other.trc", "apart", "one person")
     expect("absent", CONFIG.replace("A_emg.sto", "A_gme.sto"), "A_gme.sto")
 
 
@@ -150,6 +239,9 @@ def main():
         make_motion("C", 3, 0.08)
         make_person("ABC")
         test_finds()
+        test_solvers_agree()
+        test_told()
+        test_channels()
         test_wrong_input()
 
 

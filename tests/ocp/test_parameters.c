@@ -255,8 +255,8 @@ static void mixed_derivatives(void **state) {
                      MHE_OK);
     assert_true(mhi_parameters_room(r.system) <= 4096);
     assert_int_equal(mhi_parameters_measure(mhi_ocp_parameters(r.ocp), signals, r.system,
-                                            mhi_ocp_context(r.ocp), wanted, z, room, y, NULL, NULL,
-                                            &r.f.err),
+                                            mhi_ocp_context(r.ocp), wanted, z, NULL, room, y, NULL,
+                                            NULL, &r.f.err),
                      MHE_OK);
     for (int32_t s = 0; s <= MHI_SIGNAL_EXCITATION; s++) {
         double *target = mhi_ocp_target(r.ocp, s, k);

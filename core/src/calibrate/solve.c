@@ -448,7 +448,7 @@ mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_ho
     for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
         status = mhi_motion_read(c, i, err);
     }
-    return status;
+    return status == MHE_OK ? mhi_calibration_check_person(c, err) : status;
 }
 
 void mhi_calibration_close(mhi_calibration *c) {

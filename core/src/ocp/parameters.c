@@ -84,12 +84,13 @@ static void add_by(mhi_by_parameter *by, int32_t at, double value) {
     }
 }
 
-static void measure_emg(const mhi_parameters *s, const mhi_signal *control, double *y,
-                        mhi_by_parameter *by) {
+static void measure_emg(const mhi_parameters *s, const mhi_signal *control, const double *targets,
+                        double *y, mhi_by_parameter *by) {
     for (int32_t i = 0; i < control->n_y; i++) {
         const int32_t gain = s->setup.gain[i], shape = s->setup.shape[i], j = control->offset + i;
         double by_u = 1, by_A = 0, value = y[j];
-        if (isnan(value) || (gain < 0 && shape < 0)) {
+        const int32_t absent = targets != NULL && isnan(targets[j]);
+        if (isnan(value) || absent || (gain < 0 && shape < 0)) {
             continue;
         }
         if (shape >= 0) {
@@ -167,13 +168,14 @@ static mhe_status measure_markers(const mhi_parameters *s, const mhi_signal *mar
 
 mhe_status mhi_parameters_measure(const mhi_parameters *s, const mhi_signals *signals,
                                   const mhi_system *system, mhi_system_context *context,
-                                  uint32_t wanted, const double *x, double *room, double *y,
-                                  double *jacobian, mhi_by_parameter *by, mhe_error *err) {
+                                  uint32_t wanted, const double *x, const double *targets,
+                                  double *room, double *y, double *jacobian, mhi_by_parameter *by,
+                                  mhe_error *err) {
     for (int32_t i = 0; i < signals->n_y && by != NULL; i++) {
         by[i] = (mhi_by_parameter){.slope = 1};
     }
     if (wanted >> s->control & 1) {
-        measure_emg(s, &signals->signal[s->control], y, by);
+        measure_emg(s, &signals->signal[s->control], targets, y, by);
     }
     return wanted >> MHI_SIGNAL_MARKERS & 1
                ? measure_markers(s, &signals->signal[MHI_SIGNAL_MARKERS], system, context, x, room,

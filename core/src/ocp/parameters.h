@@ -59,13 +59,15 @@ mhe_status mhi_parameters_create(const mhi_parameters_setup *setup, const mhi_sy
 /* [cold] */
 mhe_status mhi_parameters_set(mhi_parameters *parameters, mhi_system *system, const double *p,
                               mhe_error *err);
-/* The signals `wanted` in y as they are measured, and `by` [n_y] of them (NULL: not wanted);
- * jacobian as of mhi_signals_evaluate, changed where markers' offsets turn with their bodies.
- * `body` [n_b x 12] and `body_q` are room. [hot] */
+/* The signals `wanted` in y as they are measured (EMG whose target of `targets` [n_y], may be NULL,
+ * is missing stays the control itself: its gain says nothing), and `by` [n_y] of them (NULL: not
+ * wanted); jacobian as of mhi_signals_evaluate, changed where markers' offsets turn with their
+ * bodies. `body` [n_b x 12] and `body_q` are room. [hot] */
 mhe_status mhi_parameters_measure(const mhi_parameters *parameters, const mhi_signals *signals,
                                   const mhi_system *system, mhi_system_context *context,
-                                  uint32_t wanted, const double *x, double *room, double *y,
-                                  double *jacobian, mhi_by_parameter *by, mhe_error *err);
+                                  uint32_t wanted, const double *x, const double *targets,
+                                  double *room, double *y, double *jacobian, mhi_by_parameter *by,
+                                  mhe_error *err);
 int32_t mhi_parameters_room(const mhi_system *system); /* doubles */
 /* dF/dp [n_x x n] out of that by the system's parameters [n_x x n_p]. [hot] */
 void mhi_parameters_fold(const mhi_parameters *parameters, int32_t n_x, int32_t n_p,
