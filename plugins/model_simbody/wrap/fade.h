@@ -27,6 +27,13 @@ int wrap_fades(const wrap_surface *surface, const double *p, const double *s, co
 double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                   const wrap_string *string, double *g, double *pp, double *ps, double *ss);
 
+/* Distance of a point from the surface, < 0 inside; from an ellipsoid roughly, 0 where it is 0. */
+double wrap_outside(const wrap_surface *surface, const double *x);
+
+/* Moves a point that is inside the obstacle, or hardly outside, to beside it, along the shortest
+ * way or nearly so; 1: it was. */
+int wrap_clears(const wrap_surface *surface, double *x);
+
 /* Whether anything is left of a string over a cylinder. */
 int wrap_is_off(const wrap_surface *surface, const wrap_string *string);
 
