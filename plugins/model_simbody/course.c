@@ -152,7 +152,7 @@ static int wrap_insert(const path_route *route, int32_t w, route_work *work) {
         if (best < 0 && now != WRAP_INSIDE) {
             now = state; /* of what does not wrap, the first that is inside is told */
             if (state == WRAP_INSIDE) {
-                blocker = string_pierces(route, w, work, a->at) ? a->wrap : b->wrap;
+                blocker = string_off(route, w, work, a->at) < 0 ? a->wrap : b->wrap;
             }
         }
         double longer =
@@ -315,8 +315,8 @@ static int course_is_clear(const path_route *route, const route_work *work) {
         if (work->pieces[i].joint[1] < 0 || work->pieces[i + 1].joint[0] < 0) {
             continue;
         }
-        if ((work->state[u] > 0 && string_pierces(route, w, work, work->strings[u].b)) ||
-            (work->state[w] > 0 && string_pierces(route, u, work, work->strings[w].a))) {
+        if ((work->state[u] > 0 && string_off(route, w, work, work->strings[u].b) < 0) ||
+            (work->state[w] > 0 && string_off(route, u, work, work->strings[w].a) < 0)) {
             return 0;
         }
     }

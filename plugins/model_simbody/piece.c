@@ -39,10 +39,10 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
     return state;
 }
 
-int string_pierces(const path_route *route, int32_t w, const route_work *work, const double *at) {
+double string_off(const path_route *route, int32_t w, const route_work *work, const double *at) {
     double x[3];
     into_frame(work->obstacles + 12 * w, at, x);
-    return wrap_outside(&route->wraps[w].surface, x) < 0;
+    return wrap_outside(&route->wraps[w].surface, x);
 }
 
 int string_clears(const path_route *route, int32_t w, const route_work *work, double *at) {
@@ -112,7 +112,7 @@ static double faded_length(const path_route *route, const route_work *work,
     const wrap_string *string = &work->strings[piece->wrap];
     int moves[2] = {end_moves(route, piece, 0), end_moves(route, piece, 1)};
     double p[3], s[3], transposed[9];
-    if (!moves[0] && !moves[1] && surface->kind != MHE_OBSTACLE_CYLINDER) {
+    if (!moves[0] && !moves[1] && surface->kind != MHE_OBSTACLE_CYLINDER && !string->held) {
         return -1;
     }
     wrap_string local = *string;

@@ -162,8 +162,8 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
 /* A joint between the strings that end at this stop and begin at the next. */
 void joint_begin(const route_work *work, int32_t stop, course_joint *joint);
 
-/* Whether a point of ground is inside the obstacle of wrap w. */
-int string_pierces(const path_route *route, int32_t w, const route_work *work, const double *at);
+/* Distance of a point of ground from the obstacle of wrap w, as wrap_outside(). */
+double string_off(const path_route *route, int32_t w, const route_work *work, const double *at);
 
 /* Moves a point of ground that is inside the obstacle of wrap w to beside it; 1: it did. */
 int string_clears(const path_route *route, int32_t w, const route_work *work, double *at);

@@ -11,20 +11,22 @@
 #define MAX_NEWTON 40
 #define MAX_HALVINGS 12
 #define MAX_CLEAR 20
+#define OFF_CENTRE 0.2
 #define FINE 1e-6    /* m: steps that lengths cannot judge */
 #define TIGHT 1e-13  /* m: last step of Newton's method */
 #define LONGEST 0.02 /* m: longest step */
 
-void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
-    const course_stop *a = &work->stops[stop], *b = &work->stops[stop + 1];
+/* In the middle between b and a, across the way from one to the other; `t`: its direction where they
+ * are all but the same. */
+static void joint_put(course_joint *joint, const double *b, const double *a, const double *t) {
     double u[3], least[3] = {0, 0, 0}, norm = 0;
     for (int i = 0; i < 3; i++) {
-        joint->at[i] = 0.5 * (a->at[i] + b->at[i]);
-        u[i] = b->at[i] - a->at[i];
+        joint->at[i] = 0.5 * (b[i] + a[i]);
+        u[i] = a[i] - b[i];
     }
     norm = sqrt(dot3(u, u));
-    for (int i = 0; i < 3; i++) { /* (nearly no distance: along the string) */
-        u[i] = norm > 1e-9 ? u[i] / norm : work->strings[a->wrap].t[1][i];
+    for (int i = 0; i < 3; i++) {
+        u[i] = norm > 1e-9 ? u[i] / norm : t[i];
     }
     int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2)
                                      : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
@@ -35,6 +37,11 @@ void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
         joint->across[0][i] /= norm;
     }
     cross3(u, joint->across[0], joint->across[1]);
+}
+
+void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
+    const course_stop *a = &work->stops[stop], *b = &work->stops[stop + 1];
+    joint_put(joint, a->at, b->at, work->strings[a->wrap].t[1]);
     joint->link = a->link;
 }
 
@@ -143,6 +150,35 @@ static void joints_move(route_work *work, double share) {
     }
 }
 
+/* Joints that are near the end of the straight way between their strings, beyond which they could
+ * not follow, are put into its middle. Returns the length then. */
+static double joints_centre(const path_route *route, route_work *work, double length,
+                            int32_t *lost) {
+    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
+        int32_t j = work->pieces[i].joint[1], u = work->pieces[i].wrap;
+        int32_t w = work->pieces[i + 1].wrap;
+        if (j < 0 || j != work->pieces[i + 1].joint[0] || work->state[u] <= 0 ||
+            work->state[w] <= 0) {
+            continue;
+        }
+        const wrap_string *before = &work->strings[u], *after = &work->strings[w];
+        double way[2] = {before->straight[1], after->straight[0]};
+        if (fmin(way[0], way[1]) > OFF_CENTRE * (way[0] + way[1])) {
+            continue;
+        }
+        course_joint last = work->joints[j];
+        joint_put(&work->joints[j], before->b, after->a, before->t[1]);
+        double now = joints_length(route, work, lost);
+        if (now <= length * (1 + 1e-12)) {
+            length = now;
+        } else {
+            work->joints[j] = last;
+            length = joints_length(route, work, lost);
+        }
+    }
+    return length;
+}
+
 /* A joint that is inside one of its obstacles is put beside it. */
 static void joints_clear(const path_route *route, route_work *work) {
     for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
@@ -167,6 +203,7 @@ int32_t joints_tighten(const path_route *route, route_work *work) {
     joints_clear(route, work);
     double length = joints_length(route, work, &lost);
     for (int32_t k = 0; k < MAX_NEWTON && isfinite(length); k++) {
+        length = joints_centre(route, work, length, &lost);
         size_t s = 0;
         while (s < sizeof shifts / sizeof shifts[0] &&
                joints_step(route, work, shifts[s]) != 0) {
@@ -190,7 +227,7 @@ int32_t joints_tighten(const path_route *route, route_work *work) {
             joints_move(work, -0.5 * share);
             share *= 0.5;
         }
-        if (!(now <= least)) { /* no way down */
+        if (!(now <= least)) { /* no way down: at the end of the digits, or in a cleft */
             joints_move(work, -share);
             (void)joints_length(route, work, &lost);
             break;

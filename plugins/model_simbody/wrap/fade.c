@@ -175,6 +175,9 @@ int wrap_is_off(const wrap_surface *surface, const wrap_string *string) {
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                const wrap_string *string) {
     double excess = wrap_length(string) - distance_of(p, s), off[2];
+    if (string->held) {
+        return 1;
+    }
     if ((moves[0] && wrap_outside(surface, p) < FADE_INSIDE * excess) ||
         (moves[1] && wrap_outside(surface, s) < FADE_INSIDE * excess)) {
         return 1;
@@ -270,6 +273,33 @@ static void fade_off(const wrap_surface *surface, const double *p, const double 
     jet_add(excess, -1, &share[0], excess);
 }
 
+/* The string's length, less what a pass that is low no longer holds. */
+static void fade_over(const wrap_surface *surface, const double *p, const double *s,
+                      const wrap_string *string, jet *length) {
+    wrap_string strings[2];
+    jet shortest, pass, excess, share;
+    if (!wrap_slips(surface, p, s, string, &strings[0], &strings[1])) {
+        return;
+    }
+    string_jet(&strings[0], &shortest);
+    jet_add(length, -1, &shortest, &excess);
+    double most = FADE_PASS * excess.value, high = wrap_length(&strings[1]) - length->value;
+    if (high >= most) {
+        return;
+    }
+    if (high < GONE * most) {
+        *length = shortest;
+        return;
+    }
+    string_jet(&strings[1], &pass);
+    jet_add(&pass, -1, length, &pass);
+    jet_apply(&excess, most, FADE_PASS, 0, &share);
+    jet_divide(&pass, &share, &share);
+    jet_rise(&share, &share);
+    jet_multiply(&share, &excess, &excess);
+    jet_add(&shortest, 1, &excess, length);
+}
+
 static void jet_out(const jet *x, double *g, double *pp, double *ps, double *ss) {
     if (g != NULL) {
         memcpy(g, x->slope, sizeof x->slope);
@@ -292,6 +322,7 @@ double wrap_faded(const wrap_surface *surface, const double *p, const double *s,
         return straight.value;
     }
     string_jet(string, &length);
+    fade_over(surface, p, s, string, &length);
     jet_add(&length, -1, &straight, &excess);
     beyond(surface, string, off);
     if (surface->kind == MHE_OBSTACLE_CYLINDER && off[0] > 0 && off[1] > 0) {

@@ -8,6 +8,9 @@
  *     an end that moves, h outside the surface:    E S(h / (k E))
  *     both contacts beyond the cylinder's end,
  *     by x and y, its radius r:                    E (1 - S(x / (m r)) S(y / (m r)))
+ *     held on the side asked for, where the
+ *     string of any side is shorter, by F, and
+ *     the pass between both higher, by b:          E - F + F S(b / (l F))
  * so that what ends inside fades the faster the less it is; the slope does not exceed 15 / (8 k).
  * An end that stays where it is on the obstacle's body never comes in, and fades nothing. */
 #ifndef SIMBODY_FADE_H
@@ -17,6 +20,7 @@
 
 #define FADE_INSIDE 0.25 /* k */
 #define FADE_OFF 0.25    /* m */
+#define FADE_PASS 0.25   /* l */
 
 /* Whether a string between p and s, in the obstacle's frame, is fading; `moves`: of either end. */
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
