@@ -94,8 +94,8 @@ typedef struct route_work {
     int32_t n_order;
     int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */
     int32_t pushes, pushed; /* see wrap_try(): whether it may, whether it did */
-    course_joint *joints; /* [n_wraps] */
-    course_piece *pieces; /* [n_points + 2 n_wraps] */
+    course_joint *joints;   /* [n_wraps] */
+    course_piece *pieces;   /* [n_points + 2 n_wraps] */
     int32_t n_joints, n_pieces;
     double *newton; /* [(2 n_wraps) x (2 n_wraps + 1)] */
     strand_step *steps[2];

@@ -13,11 +13,11 @@
 #define MAX_CLEAR 20
 #define OFF_CENTRE 0.2
 #define FINE 1e-6    /* m: steps that lengths cannot judge */
-#define TIGHT 1e-13  /* m: last step of Newton's method */
+#define TIGHT 1e-8   /* m: last step of Newton's method */
 #define LONGEST 0.02 /* m: longest step */
 
-/* In the middle between b and a, across the way from one to the other; `t`: its direction where they
- * are all but the same. */
+/* In the middle between b and a, across the way from one to the other; `t`: its direction where
+ * they are all but the same. */
 static void joint_put(course_joint *joint, const double *b, const double *a, const double *t) {
     double u[3], least[3] = {0, 0, 0}, norm = 0;
     for (int i = 0; i < 3; i++) {
@@ -113,8 +113,8 @@ static double joints_length(const path_route *route, route_work *work, int32_t *
         }
         piece_ends(work, piece, ends);
         wrap_string last = work->strings[w];
-        work->state[w] = string_between(
-            route, w, ends[0], ends[1], work->state[w] > 0 ? &last : NULL, work, &work->strings[w]);
+        work->state[w] = string_between(route, w, ends[0], ends[1],
+                                        work->state[w] > 0 ? &last : NULL, work, &work->strings[w]);
         if (work->state[w] < 0) {
             *lost = w;
             return INFINITY;
@@ -205,15 +205,14 @@ int32_t joints_tighten(const path_route *route, route_work *work) {
     for (int32_t k = 0; k < MAX_NEWTON && isfinite(length); k++) {
         length = joints_centre(route, work, length, &lost);
         size_t s = 0;
-        while (s < sizeof shifts / sizeof shifts[0] &&
-               joints_step(route, work, shifts[s]) != 0) {
+        while (s < sizeof shifts / sizeof shifts[0] && joints_step(route, work, shifts[s]) != 0) {
             s++;
         }
         double step = 0, now = INFINITY;
         for (int32_t j = 0; j < n; j++) {
             step = fmax(step, fabs(work->newton[j * (n + 1) + n]));
         }
-        if (!(step >= TIGHT)) {
+        if (isnan(step)) {
             break;
         }
         double share = step > LONGEST ? LONGEST / step : 1;
@@ -233,6 +232,9 @@ int32_t joints_tighten(const path_route *route, route_work *work) {
             break;
         }
         length = now;
+        if (step < TIGHT) { /* the next one would be its square */
+            break;
+        }
     }
     return isfinite(length) ? -1 : lost;
 }

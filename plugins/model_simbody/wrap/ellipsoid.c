@@ -18,6 +18,7 @@
 #define NEAR 0.03 /* of the length: planes that are not worse than that may hold the shortest */
 #define OUTSIDE 1e-9
 #define PASSES 4
+#define SURE 0.6       /* twice what it begins to let go at (fade.h), by the fan's measure */
 #define PASS_TURN 0.15 /* rad */
 #define SAME 1e-9      /* of a length: the same string */
 #define HALF_TURN 3.141592653589793
@@ -222,6 +223,7 @@ static int shortest_of(const wrap_surface *surface, const double *p, const doubl
             wrap_length(&string) < shortest) {
             shortest = wrap_length(&string);
             *out = string;
+            out->held = 0;
         }
     }
     return isfinite(shortest);
@@ -291,14 +293,18 @@ int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s
     return shortest_of(surface, p, s, &f, strings, allowed, out) ? needs : WRAP_UNSOLVED;
 }
 
-/* The pass on the way from the fan's k-th string to its lowest one, in steps of `way`. 0: found. */
-static int pass_of(const wrap_surface *surface, const double *p, const double *s, const fan *f,
-                   const fan_string *strings, int k, int lowest, int way, double above,
-                   wrap_string *out) {
+/* The highest string of the fan on the way from the k-th to the lowest one, in steps of `way`. */
+static int fan_top(const fan_string *strings, int k, int lowest, int way) {
     int top = k;
     for (int i = k; i != lowest; i = (i + FAN + way) % FAN) {
         top = strings[i].length > strings[top].length ? i : top;
     }
+    return top;
+}
+
+/* The pass near the fan's highest string, from there on in steps of `way`. 0: found. */
+static int pass_of(const wrap_surface *surface, const double *p, const double *s, const fan *f,
+                   const fan_string *strings, int top, int way, double above, wrap_string *out) {
     double angle = fan_angle(strings, top);
     for (int try = 0; try < PASSES; try++) {
         if (solve_from(surface, p, s, f, angle + way * try * PASS_TURN, 1, out) == 0 &&
@@ -329,17 +335,22 @@ int wrap_slips(const wrap_surface *surface, const double *p, const double *s,
         near = fmin(near, square);
         all[i] = 1;
     }
-    if (!shortest_of(surface, p, s, &f, strings, all, shortest) ||
+    int lowest = fan_lowest(strings),
+        tops[2] = {fan_top(strings, k, lowest, -1), fan_top(strings, k, lowest, 1)};
+    double lower = fmin(strings[tops[0]].length, strings[tops[1]].length);
+    if (lower - strings[k].length > SURE * (strings[k].length - strings[lowest].length) ||
+        !shortest_of(surface, p, s, &f, strings, all, shortest) ||
         !(wrap_length(shortest) < length * (1 - SAME))) {
-        return 0;
+        return 0; /* (held by far; by nothing) */
     }
-    for (int way = -1; way <= 1; way += 2) {
+    for (int e = 0; e < 2; e++) {
         wrap_string string;
-        if (pass_of(surface, p, s, &f, strings, k, fan_lowest(strings), way, length, &string) ==
-                0 &&
+        if (strings[tops[e]].length < lower * (1 + NEAR) &&
+            pass_of(surface, p, s, &f, strings, tops[e], 2 * e - 1, length, &string) == 0 &&
             wrap_length(&string) < least) {
             least = wrap_length(&string);
             *pass = string;
+            pass->held = 0;
             found = 1;
         }
     }

@@ -7,10 +7,10 @@
 #include <math.h>
 #include <string.h>
 
-#define N 6       /* coordinates of both ends */
+#define N 6        /* coordinates of both ends */
 #define CLEAR 0.02 /* of the radius */
-#define DEEP 0.1 /* of the radius */
-#define GONE 1e-5 /* of the way over which it fades: nothing that counts is left */
+#define DEEP 0.1   /* of the radius */
+#define GONE 1e-5  /* of the way over which it fades: nothing that counts is left */
 
 typedef struct jet {
     double value, slope[N], curve[N][N];
@@ -317,7 +317,8 @@ double wrap_faded(const wrap_surface *surface, const double *p, const double *s,
     double off[2], most = FADE_INSIDE * (wrap_length(string) - distance_of(p, s));
     straight_jet(p, s, &straight);
     if ((moves[0] && wrap_outside(surface, p) < GONE * most) ||
-        (moves[1] && wrap_outside(surface, s) < GONE * most)) { /* its derivatives need not be finite */
+        (moves[1] &&
+         wrap_outside(surface, s) < GONE * most)) { /* its derivatives need not be finite */
         jet_out(&straight, g, pp, ps, ss);
         return straight.value;
     }
