@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded walks with whole-body models, against what OpenSim's own tools say of them.
 
-    walking_trials.py gait2392|walk3d|static PATH/mhe-run PATH/mhe-model SOURCE_DIR [KEEP_DIR]   status 77: the trial is not there
+    walking_trials.py gait2392|walk3d|static|truth PATH/mhe-run PATH/mhe-model SOURCE_DIR [KEEP_DIR]   status 77: the trial is not there
 
 gait2392: the reference was made with the markers where OpenSim's Scale tool put them on this person (scaling/
 reference_subject01_simbody.osim), not where the model file has them: with those places the reference minimises its own
@@ -14,7 +14,11 @@ them, and the metatarsal joints are welded, as they were there.
 
 static: forces and joint reactions beside OpenSim's static optimisation (least squares of activations, rigid tendons, no
 passive forces). With KEEP_DIR also the figure of docs/walking.md, static.svg (gnuplot).
+
+truth: a motion of Rajagopal's model near to walk3d's angles, under its plates' loads, integrated with other steps than the
+estimator's (two Gauss stages each 5 ms); its markers alone give the forces back.
 """
+import functools
 import json
 import math
 import os
@@ -47,10 +51,10 @@ def read(path):
         return file.read()
 
 
-def run(runs, name, text):
+def run(runs, name, text, instead={}):
     config, out = os.path.join(runs.work, name + ".yaml"), os.path.join(runs.work, name)
     with open(config, "w") as file:
-        file.write(COMMON + text)
+        file.write(functools.reduce(lambda whole, pair: whole.replace(*pair), instead.items(), COMMON + text))
     subprocess.check_call([runs.run, config, "--out", out, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     with open(os.path.join(out, "summary.json")) as file:
         summary = json.load(file)
@@ -269,6 +273,29 @@ def static(runs, folder):
         draw(runs.work, times, pairs)
 
 
+def truth(runs, folder):
+    folder = os.path.join(folder, "walk3d")
+    angles = os.path.join(runs.work, "angles.sto")
+    every_tenth(os.path.join(folder, "coordinates.sto"), angles, True)
+    costs = (TRACK % "qdot, sigma: 1" + TRACK % "activation, value: [0], sigma: 0.3" +
+             TRACK % ("residual_torque, value: [0], sigma: 100, of: [%s]" % ", ".join(NO_MUSCLE)) +
+             TRACK % ("residual_torque, value: [0], sigma: 3, of: [%s]" % ", ".join(LEGS)))
+    text = ("model: {file: %s, unsupported: warn, locked_at: {mtp_angle_r: 0, mtp_angle_l: 0}}\n"
+            "data: {%%s, rates: true, external_loads: %s}\ncosts:\n%%s" % (
+                os.path.join(folder, "subject_walk_scaled.osim"), os.path.join(folder, "grf_walk.xml")))
+    true, _ = run(runs, "truth", text % ("angles: " + angles, TRACK % "q, sigma: 0.01" + costs),
+                  {"stages: 1, max_step: 0.02": "stages: 2, max_step: 0.005"})
+    out, summary = run(runs, "back", text % ("markers: " + os.path.join(true, "markers.trc"),
+                                             TRACK % "markers, sigma: 0.0005" + costs))
+    runs.expect("truth: windows not converged", 1 - summary["converged"], 0.01)
+    known, own = table(os.path.join(true, "forces.sto")), table(os.path.join(out, "forces.sto"))
+    parts = {name: rms([f - at(t, known["time"], known[name]) for t, f in zip(own["time"], own[name])][8:-3]) / max(known[name])
+             for name in own if name != "time"}
+    worst = max(parts, key=parts.get)
+    print("truth: force of %d muscles, RMS of each one's own peak: mean %.4f" % (len(parts), sum(parts.values()) / len(parts)))
+    runs.expect("truth: the worst, %s of %.0f N" % (worst, max(known[worst])), parts[worst], 0.02)
+
+
 def main():
     what, arguments, keep = sys.argv[1], sys.argv[2:5], sys.argv[5:]
     shared = os.environ.get("MHE_SHARED", os.path.join(arguments[2], "..", "shared"))
@@ -277,7 +304,7 @@ def main():
         return 77
     with tempfile.TemporaryDirectory() as work:
         runs = Runs(arguments, keep[0] if keep else work)
-        {"gait2392": gait2392, "walk3d": walk3d, "static": static}[what](runs, folder)
+        {"gait2392": gait2392, "walk3d": walk3d, "static": static, "truth": truth}[what](runs, folder)
     return 0 if runs.good else 1
 
 

@@ -254,7 +254,7 @@ static void write_loads(const char *folder, load_edit *edit) {
             double v[9] = {30 * sin(5 * t), 850 * on, 10, 0.3, 0, 0.1, 0, on, 0};
             v[0] *= on;
             v[2] *= on;
-            v[3] = on > 0.02 ? v[3] : 331; /* what a plate says of no force */
+            v[3] = on > 0 ? v[3] : 331; /* what a plate says of no force */
             if (edit != NULL) {
                 edit(t, foot, v);
             }
@@ -324,6 +324,11 @@ static void drifting(double t, int foot, double v[9]) {
     v[1] += foot == 0 ? 30 * t : 0;
 }
 
+static void runs_away(double t, int foot, double v[9]) {
+    (void)t;
+    v[3] += foot == 1 && v[1] < 90 ? 331 : 0;
+}
+
 static void loads_against_gravity_weight_and_markers(void **state) {
     char folder[] = "/tmp/mhe-loads-XXXXXX";
     static const struct {
@@ -336,6 +341,7 @@ static void loads_against_gravity_weight_and_markers(void **state) {
         {kilonewtons, MHI_FINDING_DOUBTFUL, "the model weighs 785 N"},
         {far_away, MHI_FINDING_DOUBTFUL, "'foot1' acts up to 2.5"},
         {drifting, MHI_FINDING_DOUBTFUL, "'foot0' shows"},
+        {runs_away, MHI_FINDING_DOUBTFUL, "'foot1' acts 33"},
     };
     (void)state;
     assert_non_null(mkdtemp(folder));

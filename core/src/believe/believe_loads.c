@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* believe_loads.c: forces on bodies from a file against gravity, the body's weight and the markers:
  * another frame or axis, a wrong sign or unit, a plate that drifts, points far off the body. Points
- * where the force is small mean nothing and are not looked at. */
+ * where the force is small mean nothing; they matter where they are so far that it is a moment. */
 #include "base/values.h"
 #include "believe/believe.h"
 #include "io/external_loads.h"
@@ -17,6 +17,7 @@
 #define MOST 4.0       /* of the weight, the largest */
 #define FAR 0.5        /* m, of a point beside all markers of its time */
 #define FAR_SHARE 0.05 /* of the samples with a force */
+#define LEVER 20.0     /* N m, of a small force with such a point */
 #define UNLOADED 0.15  /* share of the largest force below which a plate may be unloaded */
 #define REST_SHARE 0.1 /* of the samples: so long a plate must be unloaded to judge its zero */
 
@@ -146,6 +147,33 @@ static void check_points(const view *v, int32_t l) {
     }
 }
 
+/* A small force whose point runs away is a moment that nobody exerted. */
+static void check_levers(const view *v, int32_t l) {
+    double force[3], point[3], largest = 0, size = 0, away = 0, when = 0;
+    for (int32_t k = 0; k < v->loads->n_rows && v->r->markers != NULL; k++) {
+        const int32_t frame = frame_at(v->r, v->loads->time[k]);
+        if (frame < 0 || !take(v, k, l, force, point) || length(force) >= MUCH) {
+            continue;
+        }
+        const double far = beside(v, frame, point), moment = far * length(force);
+        if (moment > largest) {
+            largest = moment;
+            size = length(force);
+            away = far;
+            when = v->loads->time[k];
+        }
+    }
+    if (largest > LEVER) {
+        mhi_findings_add(v->findings, MHI_FINDING_DOUBTFUL,
+                         "a point means nothing where the force is small: set force and torque to "
+                         "0 there",
+                         "%s: '%s' acts %.3g m beside all markers with %.3g N (at %.4g s), a "
+                         "moment of %.3g N m",
+                         v->run->data.external_loads, v->loads->names[l], away, size, when,
+                         largest);
+    }
+}
+
 /* Median of the smallest forces in rows [from, to), NaN where the plate is never unloaded. */
 static double rest(const view *v, int32_t l, int32_t from, int32_t to, double largest) {
     double *sizes = malloc(sizeof(double) * ((size_t)(to - from) + 1)), force[3], point[3];
@@ -194,6 +222,7 @@ static int32_t is_free(const mhe_description *d) {
 mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *d, const mhi_recording *r,
                              mhi_findings *findings, mhe_error *err) {
     view v = {.run = run, .d = d, .r = r, .findings = findings};
+    const int32_t before = findings->n;
     if (run->data.external_loads == NULL) {
         return MHE_OK;
     }
@@ -210,6 +239,9 @@ mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *d, const
         for (int32_t l = 0; l < v.loads->n_loads; l++) {
             check_points(&v, l);
             check_zero(&v, l);
+        }
+        for (int32_t l = 0; l < v.loads->n_loads && findings->n == before; l++) {
+            check_levers(&v, l); /* of loads that are right otherwise */
         }
     }
     mhi_external_loads.free(v.loads);
