@@ -13,6 +13,7 @@
 #define WORTH 0.003     /* m by which it must be nearer at least */
 #define HOPELESS 0.05   /* m RMS: no posture is near */
 #define ROUNDS 40       /* of postures and transform by turns */
+#define LIKELY 8        /* axes that are looked at in all frames */
 #define NEARLY 1.25     /* times the best one's distance: the simplest of them is the remedy */
 #define SLIGHT_TURN 1.5 /* degrees */
 #define SLIGHT_SHIFT 0.004 /* m */
@@ -129,23 +130,49 @@ static void try_near(mhi_pose_search *s, trial *best) {
     }
 }
 
+/* What axes it is worth to look at in all frames: the nearest in a few, shifted or not. */
+static int32_t choose_axes(mhi_pose_search *s, int32_t chosen[LIKELY]) {
+    double distance[48];
+    int32_t n = 0;
+    mhi_pose_look(s, 1);
+    for (int32_t i = 0; i < 48; i++) {
+        mhi_pose pose = right_angles(i % 24, i / 24);
+        const double as_is = mhi_pose_fit(s, &pose, 1);
+        distance[i] = fmin(as_is, mhi_pose_adjust(s, MHI_POSE_SHIFT, 6, &pose));
+    }
+    mhi_pose_look(s, 0);
+    for (; n < LIKELY; n++) {
+        int32_t nearest = -1;
+        for (int32_t i = 0; i < 48; i++) {
+            nearest = distance[i] < (nearest < 0 ? INFINITY : distance[nearest]) ? i : nearest;
+        }
+        if (nearest < 0) {
+            break;
+        }
+        chosen[n] = nearest;
+        distance[nearest] = INFINITY;
+    }
+    return n;
+}
+
 /* Other axes, other hands, each with and without a shift. */
 static void try_axes(mhi_pose_search *s, trial *best) {
-    for (int32_t mirrored = 0; mirrored < 2; mirrored++) {
-        for (int32_t number = 0; number < 24; number++) {
-            mhi_pose pose = right_angles(number, mirrored);
-            double axis[3];
-            const double degrees = axis_of(&pose, axis);
-            const int about_x = fabs(axis[0]) > 0.99 && degrees < 100;
-            const int32_t cost = 1 + 4 * mirrored + (about_x || degrees < 1 ? 0 : 1);
-            double rms = mhi_pose_fit(s, &pose, 1);
-            consider(best, &pose, rms, cost);
-            rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, 6, &pose);
+    int32_t chosen[LIKELY];
+    const int32_t n = choose_axes(s, chosen);
+    for (int32_t i = 0; i < n; i++) {
+        const int32_t number = chosen[i] % 24, mirrored = chosen[i] / 24;
+        mhi_pose pose = right_angles(number, mirrored);
+        double axis[3];
+        const double degrees = axis_of(&pose, axis);
+        const int about_x = fabs(axis[0]) > 0.99 && degrees < 100;
+        const int32_t cost = 1 + 4 * mirrored + (about_x || degrees < 1 ? 0 : 1);
+        double rms = mhi_pose_fit(s, &pose, 1);
+        consider(best, &pose, rms, cost);
+        rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, 6, &pose);
+        consider(best, &pose, rms, cost + 2);
+        if (rms < 2 * best->rms) {
+            rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, ROUNDS, &pose);
             consider(best, &pose, rms, cost + 2);
-            if (rms < 2 * best->rms) {
-                rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, ROUNDS, &pose);
-                consider(best, &pose, rms, cost + 2);
-            }
         }
     }
     mhi_pose pose = best->pose;

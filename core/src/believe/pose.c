@@ -12,6 +12,7 @@
 #include <string.h>
 
 #define FRAMES 12
+#define FEW 3    /* for a first look */
 #define ENOUGH 2 /* markers of a frame */
 
 struct mhi_pose_search {
@@ -19,6 +20,7 @@ struct mhi_pose_search {
     mhi_system_context *context;
     mhi_start *start;
     int32_t n_frames, n_q, n_k;
+    int32_t every;                /* frame is looked at */
     double *raw, *turned, *model; /* [frames x 3 n_k] */
     double *q, *rest;             /* [frames x n_q], [n_q] */
     mhi_arena arena;
@@ -68,6 +70,7 @@ mhe_status mhi_pose_open(const mhi_system *system, const mhi_recording *r, mhi_p
     s->description = d;
     s->n_q = d->n_coordinates;
     s->n_k = d->n_markers;
+    s->every = 1;
     s->raw = MHI_TAKE(&arena, double, FRAMES * 3 * s->n_k);
     s->turned = MHI_TAKE(&arena, double, FRAMES * 3 * s->n_k);
     s->model = MHI_TAKE(&arena, double, FRAMES * 3 * s->n_k);
@@ -96,6 +99,10 @@ mhe_status mhi_pose_open(const mhi_system *system, const mhi_recording *r, mhi_p
     return MHE_OK;
 }
 
+void mhi_pose_look(mhi_pose_search *s, int32_t few) {
+    s->every = few ? (s->n_frames + FEW - 1) / FEW : 1;
+}
+
 void mhi_pose_close(mhi_pose_search *s) {
     if (s != NULL) {
         mhi_start_free(s->start);
@@ -119,14 +126,15 @@ static void apply(const mhi_pose *pose, const double in[3], double out[3]) {
 double mhi_pose_fit(mhi_pose_search *s, const mhi_pose *pose, int32_t anywhere) {
     double squares = 0;
     int32_t n = 0;
-    for (int32_t f = 0; f < s->n_frames; f++) {
+    for (int32_t f = 0; f < s->n_frames; f += s->every) {
         const ptrdiff_t at = (ptrdiff_t)f * 3 * s->n_k;
         double *q = s->q + (ptrdiff_t)f * s->n_q, rms = NAN;
         for (int32_t i = 0; i < s->n_k; i++) {
             apply(pose, s->raw + at + 3 * i, s->turned + at + 3 * i);
         }
         if (anywhere) {
-            memcpy(q, f == 0 ? s->rest : q - s->n_q, sizeof(double) * (size_t)s->n_q);
+            memcpy(q, f == 0 ? s->rest : q - (ptrdiff_t)s->every * s->n_q,
+                   sizeof(double) * (size_t)s->n_q);
         }
         const mhe_status status = (anywhere && f == 0 ? mhi_start_search : mhi_start_posture)(
             s->start, s->turned + at, q, &rms, NULL);
@@ -233,24 +241,29 @@ static void nearest_turn(const double h[9], double hand, double out[9]) {
     }
 }
 
+/* Was marker i of all frames looked at, and seen? */
+static int32_t counts(const mhi_pose_search *s, int32_t i) {
+    return i / s->n_k % s->every == 0 && !isnan(s->raw[3 * i]);
+}
+
 /* The best transform of the frames' raw markers to where the model has them. */
 static void procrustes(const mhi_pose_search *s, int32_t freedom, mhi_pose *pose) {
     const int32_t n = s->n_frames * s->n_k;
     double from[3] = {0}, to[3] = {0}, h[9] = {0}, spread = 0, along = 0;
     int32_t seen = 0;
     for (int32_t i = 0; i < n; i++) {
-        for (int32_t k = 0; k < 3 && !isnan(s->raw[3 * i]); k++) {
+        for (int32_t k = 0; k < 3 && counts(s, i); k++) {
             from[k] += s->raw[3 * i + k];
             to[k] += s->model[3 * i + k];
         }
-        seen += !isnan(s->raw[3 * i]);
+        seen += counts(s, i);
     }
     for (int32_t k = 0; k < 3; k++) { /* without a shift both turn about the origin */
         from[k] = freedom & MHI_POSE_SHIFT ? from[k] / seen : 0;
         to[k] = freedom & MHI_POSE_SHIFT ? to[k] / seen : 0;
     }
     for (int32_t i = 0; i < n; i++) {
-        for (int32_t a = 0; a < 3 && !isnan(s->raw[3 * i]); a++) {
+        for (int32_t a = 0; a < 3 && counts(s, i); a++) {
             for (int32_t b = 0; b < 3; b++) {
                 h[3 * a + b] += (s->model[3 * i + a] - to[a]) * (s->raw[3 * i + b] - from[b]);
             }

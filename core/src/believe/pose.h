@@ -24,6 +24,9 @@ mhe_status mhi_pose_open(const mhi_system *system, const mhi_recording *recordin
                          mhi_pose_search **search, mhe_error *err);
 void mhi_pose_close(mhi_pose_search *search);
 
+/* 1: few frames are looked at from here on, for a first choice; 0: all. */
+void mhi_pose_look(mhi_pose_search *search, int32_t few);
+
 mhi_pose mhi_pose_identity(void);
 /* RMS distance of the transformed markers from the nearest postures, m. `anywhere`: these are
  * looked for from all over the ranges, else from the postures before. NaN: not known. */

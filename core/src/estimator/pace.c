@@ -16,7 +16,8 @@
 #define PREDICT 0.8
 #define POSTURES 0.5 /* of what is left, to search postures */
 /* A solution of a linear system over all intervals (mhe_solve_control.spent), of each of them, in
- * units of work: as an acceleration of the arm takes 1.1 us and a solution for seven 6. */
+ * units of work: as an acceleration of the arm takes 1 us, with derivatives 3.3, a solution for
+ * seven 6. */
 #define SOLUTION 1.6
 /* The first window starts from far and has no frame before it: this much, of each interval; good
  * recordings take a third of it at most. Where the integrator needs more than PLAIN for an interval
