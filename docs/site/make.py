@@ -13,8 +13,8 @@ import sys
 from pathlib import Path
 
 PROGRAMS = ["mhe-run", "mhe-live", "mhe-model", "mhe-calibrate", "mhe-sim", "mhe-study", "mhe-bench"]
-TUTORIALS = ["raw-emg", "walking", "calibration", "calibrate", "live", "realtime", "batch", "simulate", "studies", "python", "matlab",
-             "plugins"]
+TUTORIALS = ["first-run", "own-model", "recording", "walking", "calibration", "calibrate", "python", "matlab", "embedding", "plugins"]
+HOW_TO = ["install", "raw-emg", "live", "realtime", "batch", "simulate", "studies"]
 EXPLANATIONS = ["outputs", "believability", "faq", "opensim", "paths", "elastic-tendon", "uncertainty", "study", "performance",
                 "comparison", "architecture", "abi", "style", "glossary"]
 
@@ -98,9 +98,9 @@ class Site:
         return sorted(f"{folder}/{page.name}" for page in (self.work / "pages" / folder).glob("*.md"))
 
     def nav(self):
-        known = self.listed(TUTORIALS) + self.listed(EXPLANATIONS) + ["index.md", "config.md", "contributing.md", "changelog.md"]
+        known = self.listed(TUTORIALS) + self.listed(HOW_TO) + self.listed(EXPLANATIONS) + ["index.md", "config.md", "contributing.md", "changelog.md"]
         rest = sorted(p.name for p in (self.work / "pages").glob("*.md") if p.name not in known)
-        return [("Start", ["index.md"]), ("How to", self.listed(TUTORIALS)), ("Understand", self.listed(EXPLANATIONS) + rest),
+        return [("Start", ["index.md"]), ("Tutorials", self.listed(TUTORIALS)), ("How to", self.listed(HOW_TO)), ("Understand", self.listed(EXPLANATIONS) + rest),
                 ("Reference", ["config.md"] + [f"programs/{p}.md" for p in self.used]),
                 ("Plugins", self.below("plugins")), ("Models", self.below("models")), ("Headers", self.below("headers")),
                 ("Project", ["contributing.md", "changelog.md"])]
