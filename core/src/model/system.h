@@ -146,6 +146,11 @@ mhe_status mhi_system_close_loops(mhi_system_context *context, double *q, double
  * acceleration. NULL: no loops. */
 const double *mhi_system_loop_force(const mhi_system_context *context);
 
+/* Bodies [n_b x 12] and, if not NULL, their velocities by the coordinates' [n_b x 6 x n_q], as in
+ * mhe/model.h. [hot] */
+mhe_status mhi_system_bodies(mhi_system_context *context, const double *q, double *body,
+                             double *body_q, mhe_error *err);
+
 /* General bounds of all entries of a role, one behind the other. */
 void mhi_layout_bounds(const mhe_layout *layout, int32_t role, double *lower, double *upper);
 
