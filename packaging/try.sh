@@ -49,7 +49,7 @@ inside "the README's demo" 'cd /tmp && cp -r /usr/share/mhe/models . && mhe-run 
     [ -s out/demo/report.html ] && [ "$(sed "1,/endheader/d" out/demo/estimates.sto | grep -c .)" -eq 95 ]'
 inside "a man page and completion of every program" 'for program in /usr/bin/mhe-*; do
         name=$(basename $program)
-        [ -s /usr/share/man/man1/$name.1.gz ] || [ $(grep -c "path-exclude.*man" /etc/dpkg/dpkg.cfg.d/* 2>/dev/null | wc -l) -gt 0 ]
+        [ -s /usr/share/man/man1/$name.1.gz ]
         [ -s /usr/share/bash-completion/completions/$name ]
     done'
 inside "apt install, Python" 'apt-get install -y --no-install-recommends /debs/python3-myohorizon_*.deb python3-pandas'
