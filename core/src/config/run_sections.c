@@ -78,9 +78,9 @@ static const mhe_option data_options[] = {
                 "kinematics tasks (.xml), whose coordinate tasks count too; or both, {file: PATH, "
                 "MARKER: WEIGHT}."),
     MHE_OPT_BOOL(mhi_data_section, rates, 0,
-                 "Joint velocities by inverse kinematics from frame to frame, which the signal "
-                 "qdot is to be close to where a cost follows it: they keep light segments from "
-                 "swinging between the frames."),
+                 "Joint velocities by inverse kinematics (or the measured angles) from frame to "
+                 "frame, which the signal qdot is to be close to where a cost follows it: they "
+                 "keep light segments from swinging between the frames."),
     MHE_OPT_TEXT(mhi_data_section, subject, 0, NULL,
                  "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };
