@@ -179,6 +179,9 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
     if (status == MHE_OK) {
         mhi_trust_solved(e, estimate->status);
         status = mhi_output_give(e, e->node, estimate, err);
+        if (status == MHE_OK) {
+            mhi_bands_give(e, e->node, estimate);
+        }
         estimate->latency = mhi_seconds() - e->pace.arrival;
         estimate->solve_time = estimate->latency + e->pace.ahead;
         estimate->iterations = info.iterations;

@@ -452,6 +452,20 @@ mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const dou
     return status;
 }
 
+mhe_status mhi_ocp_expand(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                          const mhe_stage_values *out, mhe_error *err) {
+    mhi_ocp_worker *w = &ocp->workers[0];
+    mhi_system_context_settle(w->system);
+    mhi_system_context_set_work(w->system, NULL);
+    w->linearised = 0;
+    mhe_status status = evaluate_cost(ocp, w, k, x, u, out, err);
+    if (status == MHE_OK) {
+        status = mhi_ocp_step(ocp, w, k, NULL, x, u, out, err);
+    }
+    mhi_system_context_set_work(w->system, &ocp->work);
+    return status;
+}
+
 mhi_work *mhi_ocp_work(mhi_ocp *ocp) {
     return &ocp->work;
 }

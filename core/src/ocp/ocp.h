@@ -107,6 +107,10 @@ mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const doubl
 /* The same of interval k with A [n_x x n_x] and B [n_x x n_u], of the system alone. */
 mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                              double *x_next, double *A, double *B, mhe_error *err);
+/* What a solver's evaluate() gives at node k, by worker 0, without a trace: nothing is kept for
+ * later calls, and no work is counted. */
+mhe_status mhi_ocp_expand(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                          const mhe_stage_values *out, mhe_error *err);
 /* The system context of worker 0, for kinematics outside a solve. */
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp);
 
