@@ -47,9 +47,7 @@ static void guess_one(qp *q, ptrdiff_t at) {
     if (q->fixed[at]) {
         return;
     }
-    if (active_is_equality(q, at)) {
-        q->side[at] = -1;
-    } else if (below > above && below > q->w[at] - q->lower[at]) {
+    if (active_is_equality(q, at) || (below > above && below > q->w[at] - q->lower[at])) {
         q->side[at] = -1;
     } else if (above > below && above > q->upper[at] - q->w[at]) {
         q->side[at] = 1;

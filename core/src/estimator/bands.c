@@ -39,6 +39,7 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                   {&b->marker_q, 3 * e->n_k * b->n_q},
                   {&b->marker, 3 * e->n_k},
                   {&b->force, b->n_m},
+                  {&b->worst, b->n_m},
                   {&b->force_error, b->n_m * n},
                   {&b->q, b->n_q},
                   {&b->activation, b->n_m},

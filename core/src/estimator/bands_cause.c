@@ -158,15 +158,21 @@ static void size_forces(mhe_estimator *e, mhi_bands *b, const double *activation
         const double strength = b->config->max_isometric_force * muscles->force[m];
         size[m] = strength * strength;
     }
-    for (int32_t i = 0; i < MHI_N_VARIANTS; i++) {
-        if (b->variants[i] == NULL ||
-            mhi_variant_forces(b->variants[i], activation, muscles->length, muscles->velocity,
-                               b->force, NULL) != MHE_OK) {
-            continue;
+    for (int32_t i = 0; i < MHI_N_VARIANTS; i += 2) {
+        memset(b->worst, 0, sizeof(double) * (size_t)b->n_m);
+        for (int32_t way = i; way < i + 2; way++) {
+            if (b->variants[way] == NULL ||
+                mhi_variant_forces(b->variants[way], activation, muscles->length, muscles->velocity,
+                                   b->force, NULL) != MHE_OK) {
+                continue;
+            }
+            for (int32_t m = 0; m < b->n_m; m++) {
+                const double d = fabs(b->force[m] - muscles->force[m]);
+                b->worst[m] = isfinite(d) ? fmax(d, b->worst[m]) : b->worst[m];
+            }
         }
-        for (int32_t m = 0; m < b->n_m; m++) { /* the mean of both ways */
-            const double d = b->force[m] - muscles->force[m];
-            size[m] += isfinite(d) ? 0.5 * d * d : 0;
+        for (int32_t m = 0; m < b->n_m; m++) { /* of both ways the larger */
+            size[m] += b->worst[m] * b->worst[m];
         }
     }
     for (int32_t m = 0; m < b->n_m; m++) {

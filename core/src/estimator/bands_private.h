@@ -30,17 +30,17 @@ struct mhi_bands {
     mhi_gain gain;
     mhi_variant *variants[MHI_N_VARIANTS]; /* NULL: that number is known */
     int32_t n_x, n_u, n_q, n_m;
-    int32_t begun;          /* `error` is that of this window */
-    double *error;          /* [n_x x columns] of node 0 */
-    double *next;           /* the same, of the next window's */
-    double *size;           /* [columns] of each cause, in units of the gain's */
-    double *noise_share;    /* [n_m] of noise in the square of an EMG cause */
-    double *at;             /* [n_x x columns] error of the output's node */
-    double *controls;       /* [n_u x columns] of node 0; then of the output's node */
-    double *row;            /* [columns] */
-    double *marker_q;       /* [3 n_k x n_q] */
-    double *marker, *force; /* [3 n_k], [n_m] scratch */
-    double *force_error;    /* [n_m x columns] */
+    int32_t begun;                  /* `error` is that of this window */
+    double *error;                  /* [n_x x columns] of node 0 */
+    double *next;                   /* the same, of the next window's */
+    double *size;                   /* [columns] of each cause, in units of the gain's */
+    double *noise_share;            /* [n_m] of noise in the square of an EMG cause */
+    double *at;                     /* [n_x x columns] error of the output's node */
+    double *controls;               /* [n_u x columns] of node 0; then of the output's node */
+    double *row;                    /* [columns] */
+    double *marker_q;               /* [3 n_k x n_q] */
+    double *marker, *force, *worst; /* [3 n_k], [n_m], [n_m] scratch */
+    double *force_error;            /* [n_m x columns] */
     double *q, *activation, *force_sd, *moment;
     double *value, *slope; /* scratch of a node's expansion: [n_x], [n_x + n_u] */
     mhi_emg_level emg;

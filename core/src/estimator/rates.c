@@ -22,6 +22,7 @@ mhe_status mhi_rates_create(mhi_rates *r, const mhi_run *run, const mhi_system *
     const mhe_status status = mhi_start_create(system, context, &r->start, err);
     if (status == MHE_OK) {
         mhi_start_set_tasks(r->start, tasks);
+        mhi_start_set_enough(r->start, 1e-6);
     }
     return status;
 }

@@ -17,6 +17,7 @@ struct mhi_start {
     mhi_system_context *context;
     const mhi_tasks *tasks; /* NULL: none */
     int32_t n_q, n_k;
+    double enough;             /* rad or m: a step shorter than this ends the search */
     double *marker, *marker_q; /* [3 n_k], [3 n_k x n_q] */
     double *normal, *step;     /* [n_q x n_q], [n_q] */
     double *gradient, *trial, *best;
@@ -37,6 +38,7 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
     s->context = context;
     s->n_q = d->n_coordinates;
     s->n_k = d->n_markers;
+    s->enough = 1e-9;
     s->marker = MHI_TAKE(&arena, double, 3 * s->n_k);
     s->marker_q = MHI_TAKE(&arena, double, 3 * s->n_k * s->n_q);
     s->normal = MHI_TAKE(&arena, double, s->n_q * s->n_q);
@@ -57,6 +59,10 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
 
 void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks) {
     start->tasks = tasks;
+}
+
+void mhi_start_set_enough(mhi_start *start, double step) {
+    start->enough = step;
 }
 
 void mhi_start_free(mhi_start *start) {
@@ -173,7 +179,7 @@ mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, do
             return status;
         }
         const double length = propose(s, q, damping);
-        if (length < 1e-9 || mhi_system_context_spent(s->context)) {
+        if (length < s->enough || mhi_system_context_spent(s->context)) {
             break;
         }
         status = distances(s, measured, s->trial, 0, &there, err);
