@@ -12,7 +12,8 @@ ARM = {"my_arm.osim": "models/arm19/arm19.osim", "arm19.osim": "models/arm19/arm
        "reach_1.trc": "models/arm19/demo_markers.trc", "reach_1.sto": "models/arm19/demo_emg.sto",
        "reach_2.trc": "models/arm19/demo_markers.trc", "reach_2.sto": "models/arm19/demo_emg.sto"}
 WALK = {"subject.osim": "models/gait10dof/subject01.osim", "trial.trc": "models/gait10dof/demo_walk_markers.trc",
-        "trial_grf.xml": "models/gait10dof/demo_walk_loads.xml", "demo_walk_loads.sto": "models/gait10dof/demo_walk_loads.sto"}
+        "trial_grf.xml": "models/gait10dof/demo_walk_loads.xml", "demo_walk_loads.sto": "models/gait10dof/demo_walk_loads.sto", "grf.xml": "models/gait10dof/demo_walk_loads.xml",
+        "coordinates_6Hz.sto": "models/gait10dof/demo_walk_postures.sto"}
 TASKS = """<OpenSimDocument Version="40000"><IKTaskSet><objects>
 <IKMarkerTask name="R.ASIS"><apply>true</apply><weight>20</weight></IKMarkerTask>
 <IKMarkerTask name="L.ASIS"><apply>true</apply><weight>20</weight></IKMarkerTask>
