@@ -128,6 +128,8 @@ static mxArray *estimate_out(const mhe_estimator_info *info, const mhe_estimate 
     gateway_add(out, "moment", gateway_vector_out(e->moment, info->n_q));
     gateway_add(out, "residual", gateway_vector_out(e->residual, info->n_residual_torques));
     gateway_add(out, "markers", gateway_matrix_out(e->markers, info->n_markers, 3));
+    gateway_add(out, "force_sd",
+                gateway_vector_out(e->force_sd, info->n_muscles)); /* with output.uncertainty */
     return out;
 }
 

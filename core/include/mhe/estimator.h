@@ -218,7 +218,7 @@ typedef struct mhe_estimate {
                                   * solver's fast method gave up and the safe one solved */
     /* Standard deviations, where output.uncertainty asks for them, else NULL: what the config's
      * section `uncertainty` says of measurements and model, carried through the estimator to first
-     * order. */
+     * order. NaN where they could not be found. */
     const double *q_sd;          /* [n_q], rad (m) */
     const double *activation_sd; /* [n_muscles] */
     const double *force_sd;      /* [n_muscles], N */
