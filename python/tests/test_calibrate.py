@@ -42,7 +42,7 @@ def test_a_person(person, tmp_path):
     row, = found.parameters
     assert row["parameter"] == "emg_gain of BRA" and row["before"] == 1
     assert row["verdict"] in ("informed", "not informed", "at bound")
-    assert row["lower"] <= row["after"] <= row["upper"] and row["after"] != 1 and 0 < row["sd"] <= row["prior_sd"]
+    assert row["lower"] <= row["after"] <= row["upper"] and row["after"] != 1 and 0 <= row["sd"] <= row["prior_sd"]
     assert [r["held_out"] for r in found.recordings] == [False]
     verdict, _ = myohorizon.check_config(found.config)
     assert verdict in ("yes", "doubtful")
