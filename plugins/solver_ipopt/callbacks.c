@@ -5,6 +5,10 @@
 
 #include <math.h>
 
+/* What an iteration is beside a solution by recursions (mhe_solve_control.spent): a sparse
+ * factorisation and its solutions. */
+#define SOLUTIONS 40
+
 static compat_bool eval_f(compat_index n, compat_number *v, compat_bool new_x, compat_number *f,
                           void *data) {
     ipopt_solver *s = data;
@@ -117,7 +121,7 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
         s->stopped = MHE_SOLVE_INTERRUPTED;
     } else if (control != NULL &&
                ((control->deadline > 0 && is_late(s)) ||
-                (control->spent != NULL && control->spent(control->budget, 1)))) {
+                (control->spent != NULL && control->spent(control->budget, SOLUTIONS)))) {
         s->stopped = MHE_SOLVE_DEADLINE;
     }
     return s->stopped == 0 && s->nlp.failure == MHE_OK;

@@ -147,7 +147,7 @@ mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err)
 
 /* step.c: the work that this solve may do is done; `steps` interior-point steps since this was last
  * asked. */
-int32_t rti_is_spent(const rti_solver *s, int32_t steps);
+int32_t rti_is_spent(rti_solver *s);
 
 /* sqp.c */
 mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err);

@@ -36,7 +36,7 @@ void mhi_pace_predict(mhe_estimator *e);
 void mhi_pace_postures(mhe_estimator *e, int32_t begun);
 /* 1: its time or work is over. The second: mhe_solve_control.spent. */
 int32_t mhi_pace_over(mhe_estimator *e);
-int32_t mhi_pace_spent(void *estimator, int32_t steps);
+int32_t mhi_pace_spent(void *estimator, int32_t solutions);
 /* Ahead of a frame. */
 void mhi_pace_prepare(mhe_estimator *e);
 void mhi_pace_prepared(mhe_estimator *e, double seconds);

@@ -84,7 +84,8 @@ static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err)
         mhi_window_follow(e);
         look_for_late(e);
         mhi_trust_screen(e);
-        if (mhi_trust_is_lost(e)) {
+        /* Where not even a step was made from the old guess, today's measurements are nearer. */
+        if (mhi_trust_is_lost(e) || (e->begin.stuck && e->begin.restarted)) {
             (void)mhi_window_begin(e, NULL); /* where it cannot, the old start goes on */
         }
     } else {
