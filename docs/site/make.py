@@ -14,6 +14,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import findings
+
 PROGRAMS = ["mhe-run", "mhe-live", "mhe-model", "mhe-calibrate", "mhe-sim", "mhe-study", "mhe-bench"]
 TUTORIALS = ["first-run", "own-model", "recording", "walking", "calibration", "calibrate", "python", "notebook-demo", "matlab", "embedding", "plugins"]
 HOW_TO = ["install", "raw-emg", "live", "realtime", "batch", "simulate", "studies"]
@@ -71,6 +73,7 @@ class Site:
             to = self.moved_link(origin, page, found[3])
             return f"{found[1]}[{found[2]}]({to})" if to is not None else found[2]
         text = self.notebook(origin, page) if origin.suffix == ".ipynb" else origin.read_text()
+        text = text.replace("<!-- findings -->", findings.table(self.source)) if "<!-- findings -->" in text else text
         parts = re.split(r"(```.*?```)", text, flags=re.S)
         for i in range(0, len(parts), 2):
             parts[i] = re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, parts[i])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of findings in docs/faq.md, made from the calls that report them. Fails where it is stale.
+"""The table of findings, made from the calls that report them, for the site's page "Why is my estimate bad?".
 
-    findings.py check|update SOURCE_DIR
+    findings.py SOURCE_DIR      prints it
 
 A call is mhi_findings_add(list, WEIGHT, remedy, text, ...): its literals are taken as they stand, numbers and names as "…".
 """
@@ -82,23 +82,5 @@ def table(source):
     return "\n".join(lines)
 
 
-def main(mode, source):
-    source = Path(source)
-    page = source / "docs/faq.md"
-    text = page.read_text()
-    made = table(source)
-    if made.count("\n| ") < 25:
-        sys.exit("the calls that report findings are not found")
-    fresh = re.sub(r"(<!-- findings -->\n).*?(<!-- /findings -->)", lambda m: f"{m[1]}\n{made}\n{m[2]}", text, flags=re.S)
-    if fresh == text:
-        if "<!-- findings -->" not in text:
-            sys.exit("docs/faq.md has no place for the findings")
-        return
-    if mode == "update":
-        page.write_text(fresh)
-        print("updated docs/faq.md")
-        return
-    sys.exit("docs/faq.md is stale; 'tests/docs/findings.py update .' renews it")
-
-
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    print(table(Path(sys.argv[1])))
