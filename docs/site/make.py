@@ -6,15 +6,19 @@
 Pages stay readable where they lie; here their links are moved to where the pages go. The reference is made from the programs'
 own help, the plugins' READMEs and the public headers, which are the manual.
 """
+import base64
+import json
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
 
+import findings
+
 PROGRAMS = ["mhe-run", "mhe-live", "mhe-model", "mhe-calibrate", "mhe-sim", "mhe-study", "mhe-bench"]
-TUTORIALS = ["raw-emg", "walking", "calibration", "calibrate", "live", "realtime", "batch", "simulate", "studies", "python", "matlab",
-             "plugins"]
+TUTORIALS = ["first-run", "own-model", "recording", "walking", "calibration", "calibrate", "python", "notebook-demo", "matlab", "embedding", "plugins"]
+HOW_TO = ["install", "raw-emg", "live", "realtime", "batch", "simulate", "studies"]
 EXPLANATIONS = ["outputs", "believability", "faq", "opensim", "paths", "elastic-tendon", "uncertainty", "study", "performance",
                 "comparison", "architecture", "abi", "style", "glossary"]
 
@@ -33,6 +37,8 @@ class Site:
             self.pages[readme] = f"plugins/{readme.parent.name}.md"
         for readme in sorted((self.source / "models").glob("*/README.md")):
             self.pages[readme] = f"models/{readme.parent.name}.md"
+        for notebook in sorted((self.source / "docs/notebook").glob("*.ipynb")):
+            self.pages[notebook] = f"notebook-{notebook.stem}.md"
         for name in ("CONTRIBUTING.md", "CHANGELOG.md"):
             self.pages[self.source / name] = name.lower()
 
@@ -46,6 +52,8 @@ class Site:
         name, _, anchor = target.partition("#")
         if not name or re.match(r"[a-z]+:", target):
             return target
+        if name.startswith("/"):  # made here, from the root of the pages
+            return os.path.relpath(name, os.path.dirname("/" + page))
         file = (origin.parent / name).resolve()
         if file in self.pages:
             to = os.path.relpath(self.pages[file], os.path.dirname(page) or ".")
@@ -64,10 +72,30 @@ class Site:
         def link(found):
             to = self.moved_link(origin, page, found[3])
             return f"{found[1]}[{found[2]}]({to})" if to is not None else found[2]
-        parts = re.split(r"(```.*?```)", origin.read_text(), flags=re.S)
+        text = self.notebook(origin, page) if origin.suffix == ".ipynb" else origin.read_text()
+        text = text.replace("<!-- findings -->", findings.table(self.source)) if "<!-- findings -->" in text else text
+        parts = re.split(r"(```.*?```)", text, flags=re.S)
         for i in range(0, len(parts), 2):
             parts[i] = re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, parts[i])
         return "".join(parts)
+
+    def notebook(self, origin, page):
+        """A notebook as a page: its cells, what they print, and their figures."""
+        said = []
+        for cell in json.loads(origin.read_text())["cells"]:
+            source = "".join(cell["source"])
+            said.append(source if cell["cell_type"] == "markdown" else f"```python\n{source}\n```")
+            for output in cell.get("outputs", []):
+                data = output.get("data", {})
+                if "image/png" in data:
+                    picture = self.work / f"pages/pictures/{origin.stem}-{len(said)}.png"
+                    picture.parent.mkdir(parents=True, exist_ok=True)
+                    picture.write_bytes(base64.b64decode(data["image/png"]))
+                    said.append(f"![Figure of the cell above](/{picture.relative_to(self.work / 'pages')})")
+                else:
+                    text = "".join(output.get("text", data.get("text/plain", "")))
+                    said.append(f"```text\n{text}\n```")
+        return "\n\n".join(said) + "\n"
 
     def header(self, path):
         text = path.read_text()
@@ -98,9 +126,9 @@ class Site:
         return sorted(f"{folder}/{page.name}" for page in (self.work / "pages" / folder).glob("*.md"))
 
     def nav(self):
-        known = self.listed(TUTORIALS) + self.listed(EXPLANATIONS) + ["index.md", "config.md", "contributing.md", "changelog.md"]
+        known = self.listed(TUTORIALS) + self.listed(HOW_TO) + self.listed(EXPLANATIONS) + ["index.md", "config.md", "contributing.md", "changelog.md"]
         rest = sorted(p.name for p in (self.work / "pages").glob("*.md") if p.name not in known)
-        return [("Start", ["index.md"]), ("How to", self.listed(TUTORIALS)), ("Understand", self.listed(EXPLANATIONS) + rest),
+        return [("Start", ["index.md"]), ("Tutorials", self.listed(TUTORIALS)), ("How to", self.listed(HOW_TO)), ("Understand", self.listed(EXPLANATIONS) + rest),
                 ("Reference", ["config.md"] + [f"programs/{p}.md" for p in self.used]),
                 ("Plugins", self.below("plugins")), ("Models", self.below("models")), ("Headers", self.below("headers")),
                 ("Project", ["contributing.md", "changelog.md"])]

@@ -1,11 +1,11 @@
 #!/bin/sh
 # SPDX-License-Identifier: Apache-2.0
-# The package in Octave: the digits of mhe-run, and errors where something is wrong.
+# The package in Octave: the bits of mhe-run, and errors where something is wrong.
 #   octave.sh OCTAVE FOLDER SOURCE_DIR PROGRAMS
 set -u
 octave=$1 folder=$2 source=$3 programs=$4
 . "$source/tests/support/script.sh"
-"$programs/mhe-run" "$source/models/arm19/demo.yaml" --out demo --quiet --set output.picture=false > run.txt 2>&1 ||
+"$programs/mhe-run" "$source/models/arm19/demo.yaml" --out demo --quiet --set output.picture=false --set 'output.formats=[mat]' > run.txt 2>&1 ||
     fail "mhe-run: $(cat run.txt)"
 "$octave" --norc --no-gui --path "$folder" --eval "source('$source/matlab/tests/test_myohorizon.m'); \
     test_myohorizon('$source', '$work')" > out.txt 2>&1 || fail "$(cat out.txt)"

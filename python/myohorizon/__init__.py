@@ -15,6 +15,7 @@ Units are SI and radians. Missing values are NaN. Errors are exceptions (myohori
 name. Messages of the library go to the logger "myohorizon". The keys of a config: myohorizon.describe("config").
 """
 from .batch import batch
+from .calibration import Calibration, calibrate
 from .catalogue import describe, plugins, version
 from .costs import Cost
 from .errors import (ArgumentError, ClosedError, ConfigError, Error, InputError, Interrupted, NumericError, OutputError,
@@ -28,7 +29,7 @@ from .tables import Motion, Table, read_c3d, read_sto, read_trc, read_xdf
 
 __version__ = version()
 
-__all__ = ["ArgumentError", "ClosedError", "ConfigError", "Cost", "Error", "Estimate", "Estimator", "Finding", "InputError",
-           "Interrupted", "Live", "Model", "Motion", "NumericError", "OutputError", "PluginError", "Results", "Table",
-           "ThreadError", "UnsupportedError", "batch", "check_config", "describe", "plugins", "read_c3d", "read_sto", "read_trc",
-           "read_xdf", "run", "version"]
+__all__ = ["ArgumentError", "Calibration", "ClosedError", "ConfigError", "Cost", "Error", "Estimate", "Estimator",
+           "Finding", "InputError", "Interrupted", "Live", "Model", "Motion", "NumericError", "OutputError", "PluginError",
+           "Results", "Table", "ThreadError", "UnsupportedError", "batch", "calibrate", "check_config", "describe",
+           "plugins", "read_c3d", "read_sto", "read_trc", "read_xdf", "run", "version"]

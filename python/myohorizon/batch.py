@@ -2,26 +2,10 @@
 """A session's trials over the processors: mhe-run --batch."""
 import csv
 import os
-import shutil
-import subprocess
 import sys
 
-from . import _library
+from . import _programs
 from ._config import as_text
-from .errors import InputError, NumericError, OutputError
-
-
-def _program():
-    """mhe-run beside the library, or the one of the PATH."""
-    folder = os.path.dirname(os.path.realpath(_library.path)) if "/" in _library.path else ""
-    for place in ("../bin/mhe-run", "../../bin/mhe-run"):
-        path = os.path.join(folder, place)
-        if folder and os.access(path, os.X_OK):
-            return path
-    found = shutil.which("mhe-run")
-    if found is None:
-        raise OutputError("mhe-run is not found (package myohorizon)")
-    return found
 
 
 def batch(config, trials, out, *, workers=None, progress=True, **keys):
@@ -44,23 +28,17 @@ def batch(config, trials, out, *, workers=None, progress=True, **keys):
     if not isinstance(trials, (str, os.PathLike)):
         os.makedirs(out, exist_ok=True)
         trials = _write_list(trials, os.path.join(out, "trials.csv"))
-    command = [_program(), *([os.fspath(config)] if config is not None else []), "--batch", os.fspath(trials), "--out", out]
+    words = [*([os.fspath(config)] if config is not None else []), "--batch", os.fspath(trials), "--out", out]
     if workers is not None:
-        command += ["--workers", str(workers)]
+        words += ["--workers", str(workers)]
     if not progress:
-        command.append("--quiet")
-    for key, value in keys.items():
-        command += ["--set", f"{key.replace('__', '.')}={as_text(value)}"]
-    done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    lines = done.stderr.strip().splitlines()
-    message = lines[-1].removeprefix("mhe-run: ") if lines else ""
-    if done.returncode == 2:
-        raise InputError(message)
+        words.append("--quiet")
+    status, message, said = _programs.run("mhe-run", words, keys)
     table = os.path.join(out, "batch.csv")
     if not os.path.exists(table) or "interrupted" in message:
-        raise NumericError(message or f"mhe-run ended with status {done.returncode}")
-    if message and done.returncode == 0:
-        print(done.stderr, end="", file=sys.stderr)
+        raise _programs.failed("mhe-run", status, message)
+    if message and status == 0:
+        print(said, end="", file=sys.stderr)
     with open(table, encoding="utf-8", newline="") as file:
         return [_row(row) for row in csv.DictReader(file)]
 

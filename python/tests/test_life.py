@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Opened and closed ten thousand times, forgotten, imported: without growth, without delay."""
+"""Opened and closed many times, forgotten, imported: without growth, without delay."""
 import gc
 import os
 import subprocess
@@ -10,6 +10,7 @@ from support import DEMO, FAST, SOURCE
 
 import myohorizon
 
+SANITIZED = bool(os.environ.get("MHE_SANITIZE"))
 SMALL = {"model": {"file": str(SOURCE / "models/arm26/arm26.osim")}, "costs": ["mhe.cost.min-excitation"],
          "horizon": {"window": 2}, "solver": {"plugin": "mhe.solver.rti"}}
 
@@ -19,16 +20,20 @@ def resident_kb():
         return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") // 1024
 
 
-def test_ten_thousand_open_and_close_without_growth():
-    n = 300 if os.environ.get("MHE_SANITIZE") else 10000
-    for _ in range(n // 10):
+def test_opened_and_closed_without_growth():
+    """MHE_CYCLES=10000 for the whole campaign: 24 s of processor time."""
+    n = int(os.environ.get("MHE_CYCLES", 300 if SANITIZED else 1000))
+    for _ in range(300):
         myohorizon.Estimator(SMALL).close()
     gc.collect()
     before = resident_kb()
     for _ in range(n):
         myohorizon.Estimator(SMALL).close()
     gc.collect()
-    assert resident_kb() - before < (40000 if os.environ.get("MHE_SANITIZE") else 2000)
+    growth = resident_kb() - before
+    print(f"{n} cycles: {growth} kB")
+    # What the allocator keeps; a leak of one small object a cycle is beyond it. Sanitizers keep what was freed.
+    assert growth < (40000 if SANITIZED else 200 + 0.2 * n)
 
 
 def test_what_is_forgotten_or_refused_leaves_nothing():
@@ -48,11 +53,11 @@ def test_what_is_forgotten_or_refused_leaves_nothing():
     for _ in range(150):
         use()
     gc.collect()
-    assert resident_kb() - before < (60000 if os.environ.get("MHE_SANITIZE") else 2000)
+    assert resident_kb() - before < (60000 if SANITIZED else 2000)
 
 
 def test_import_takes_less_than_300_ms():
-    if os.environ.get("MHE_SANITIZE"):
+    if SANITIZED:
         pytest.skip("times under a sanitizer mean nothing")
     code = "import time; begin = time.process_time(); import myohorizon; print(time.process_time() - begin)"
     seconds = [float(subprocess.run([sys.executable, "-B", "-c", code], check=True, capture_output=True, text=True).stdout)

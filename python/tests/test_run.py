@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whole recordings: what mhe-run writes, to the digit."""
+"""Whole recordings: what mhe-run writes, to the bit."""
 import json
 import subprocess
 
 import numpy as np
 import pytest
-from support import BUILD, DEMO
+from support import BUILD, DEMO, demo_frames
 
 import myohorizon
 
@@ -13,7 +13,8 @@ import myohorizon
 @pytest.fixture(scope="module")
 def of_program(tmp_path_factory):
     out = tmp_path_factory.mktemp("out") / "demo"
-    subprocess.run([BUILD / "bin/mhe-run", DEMO, "--out", out, "--quiet", "--set", "output.picture=false"], check=True,
+    subprocess.run([BUILD / "bin/mhe-run", DEMO, "--out", out, "--quiet", "--set", "output.picture=false",
+                    "--set", "output.formats=[mat]"], check=True,
                    capture_output=True)
     return out
 
@@ -40,6 +41,19 @@ def test_the_digits_are_those_of_mhe_run(of_program, results, name, file, prefix
     for column in table.columns:
         at = labels.index(prefix + column)
         assert [row[at] for row in cells] == ["%.12g" % value for value in table[column]], column
+
+
+def test_the_bits_are_those_of_mhe_run(of_program, results):
+    """results.mat holds doubles as they are; a push a frame gives the same."""
+    scipy_io = pytest.importorskip("scipy.io", reason="python3-scipy reads what mhe-run writes for MATLAB")
+    written = scipy_io.loadmat(of_program / "results.mat", simplify_cells=True)
+    states = np.hstack([results.table(name).values for name in ("q", "qdot", "activation", "excitation")])
+    for table, values in (("estimates", states), ("forces", results.table("force").values)):
+        assert written[table]["data"].tobytes() == values.tobytes() and len(values) > 80, table
+    assert written["forces"]["time"].tobytes() == results.table("force").time.tobytes()
+    with myohorizon.Estimator(DEMO) as estimator:
+        pushed = [e for e in (estimator.push(*frame) for frame in demo_frames()) if e is not None]
+    assert np.array([e.force for e in pushed]).tobytes() == results.table("force").values.tobytes()
 
 
 def test_markers_and_quality(of_program, results):

@@ -14,7 +14,7 @@ demo=$2/models/arm19
 block() {
     page=${2:-$readme}
     awk -v before="$1" 'index($0, before) {found = 1; next}
-        found && /^ *$/ {if (n) exit; next}
+        found && /^ *(<!--.*)?$/ {if (n) exit; next}
         found {n++; match($0, /^ */); indent = n == 1 ? RLENGTH : indent; print substr($0, indent + 1)}' "$page"
 }
 
@@ -44,11 +44,10 @@ estimate without
 sed "s/^costs:.*/$some/" my.yaml > some.yaml
 estimate some
 
-# Raw EMG: its block is for another arm's muscles.
+# Raw EMG.
 {
     grep '^model:\|^horizon:' my.yaml
-    block 'the data stay as recorded:' "$raw_page" | sed -e 's/trial.trc/trial.c3d/;s/raw.sto/trial.c3d/' \
-        -e 's/DELTmed/Deltoid2/;s/bic_l, bic_b/BicepsLong, BicepsShort/'
+    block 'the data stay as recorded:' "$raw_page" | sed 's/trial.trc/trial.c3d/'
     echo 'costs: [{plugin: mhe.cost.emg-markers-high, tracked: [Deltoid2, BicepsLong, BicepsShort]}]'
 } > raw.yaml
 estimate raw

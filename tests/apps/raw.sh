@@ -58,4 +58,13 @@ cmp -s made/recording.c3d other/recording.c3d && fail "another seed, the same re
 "$bin/mhe-sim" noise "$arm/demo_recording.yaml" --out odd --set noise.raw_emg.rate=1999 > /dev/null 2> odd.txt
 [ $? -eq 2 ] && grep -q 'must be a multiple of the markers' odd.txt || fail "1999 Hz: $(cat odd.txt)"
 
+# The recording with every kind of error (docs/recording.md): made again, estimated, and believed.
+"$bin/mhe-sim" noise "$arm/lab_recording.yaml" --out lab_made > /dev/null || fail "mhe-sim noise, lab"
+[ "$(wc -c < lab_made/recording.c3d)" -eq "$(wc -c < "$arm/lab_recording.c3d")" ] || fail "lab: another size"
+[ "$(cmp -l lab_made/recording.c3d "$arm/lab_recording.c3d" | wc -l)" -lt 100 ] || fail "lab: it is another recording"
+"$bin/mhe-run" "$arm/lab.yaml" --out lab --set output.picture=false > lab.txt 2>&1 || fail "lab: $(cat lab.txt)"
+grep -qx 'usable: yes' lab.txt || fail "lab: $(cat lab.txt)"
+within lab q_deg 0.35 0.434
+within lab force_n 12.3 15.1
+
 finish "raw EMG"

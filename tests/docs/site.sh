@@ -10,3 +10,5 @@ for page in index.html config.html python.html plugins/solver_rti.html headers/e
     [ -s "$2/html/$page" ] || { echo "FAILED: there is no $page" && exit 1; }
 done
 grep -q 'marker_outlier' "$2/html/search/search_index.json" || { echo "FAILED: the search finds no key of the config" && exit 1; }
+grep -q 'muscles at full activation' "$2/html/faq.html" && [ "$(grep -c '<tr>' "$2/html/faq.html")" -gt 30 ] ||
+    { echo "FAILED: the page of findings has none" && exit 1; }

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What README.md and docs/*.md tell a reader to type.
+"""Does what README.md and docs/*.md tell a reader to do: every block of theirs is run, checked or compiled.
 
-    snippets.py SOURCE_DIR PROGRAMS
+    snippets.py SOURCE_DIR PROGRAMS [PAGE]...
 
-Blocks of ```python are run, each by itself from the source folder; those of ```octave, where Octave and the gateway are
-there. Commands in indented blocks: their programs and options must exist, their files in models/ too, and what `mhe-run` is
-to run passes --check with the same keys. "<!-- not run: why -->" before a block leaves it out. Skipped (77) are blocks
-whose language is missing.
+A page's blocks are done in their order, in a folder of its own that looks like a clone with a build in build/release and the
+files of a reader beside it (scene.py). A fenced block says what it is (sh, yaml, python, octave, csv, json, text); an indented one
+is commands where its first word is one, else YAML. Commands are run; YAML passes `mhe-run --check`. Remarks before a block:
+
+    <!-- not run: WHY -->     nothing is run; programs, options and files in models/ must be there
+    <!-- file: PATH -->       a file that another test compiles; docs.sh keeps the block equal to it
+    <!-- with: ARGUMENTS -->  each command of ours gets these too, so that it ends soon
+    <!-- save: NAME -->       the block is that file; later blocks use it
+    <!-- do: COMMAND -->      of a saved block, instead of mhe-run --check
+    <!-- like: CONFIG -->     YAML that is a part of a config: its keys are set in CONFIG, which is then checked
+
+A block that is none of these fails. What needs a program that is missing here is counted as skipped.
 """
+import collections
+import json
 import os
 import re
 import shlex
@@ -17,31 +27,66 @@ import sys
 import tempfile
 from pathlib import Path
 
+import scene
+
+try:
+    import yaml
+except ImportError:
+    print("skipped: python3-yaml is missing")
+    sys.exit(77)
+
 source, programs = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
 build = programs.parent
-failures, counts = [], {"python": 0, "octave": 0, "command": 0, "checked": 0}
-helps = {}
+failures, counts, helps = [], collections.Counter(), {}
+COMMANDS = re.compile(r"([A-Z_]+=\S+ )*(\./bootstrap|\S*/?mhe-[a-z]+|cp|cmake|ctest|octave|mex|export|docs/|tests/|for|apt|perf|podman)\b")
 
 
-def fail(page, line, text):
-    failures.append(f"{page}:{line}: {text}")
+class Block:
+    def __init__(self, page, line, kind, text, remarks):
+        self.page, self.line, self.kind, self.text, self.remarks = page, line, kind, text, remarks
+
+    def fail(self, text):
+        failures.append(f"{self.page}:{self.line}: {text}")
 
 
-def run(page, line, words, code):
-    environment = {**os.environ, "PYTHONPATH": str(build / "python"), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(words, input=code, text=True, capture_output=True, cwd=source, env=environment)
+def blocks_of(page, text):
+    """Fenced and indented blocks with the remarks before them. What is indented in a list is a block after a blank line."""
+    lines = text.splitlines()
+    k, remarks, at_list, after_blank = 0, {}, False, True
+    while k < len(lines):
+        line = lines[k]
+        fence = re.match(r"( *)```(\w*)", line)
+        if fence:
+            end = next(j for j in range(k + 1, len(lines)) if lines[j].strip() == "```")
+            body = "\n".join(x[len(fence[1]):] for x in lines[k + 1:end]) + "\n"
+            yield Block(page, k + 1, fence[2] or "?", body, remarks)
+            k, remarks, after_blank = end + 1, {}, False
+            continue
+        depth = len(line) - len(line.lstrip())
+        if after_blank and line.strip() and depth >= (6 if at_list else 4):
+            end = k
+            while end < len(lines) and (not lines[end].strip() or len(lines[end]) - len(lines[end].lstrip()) >= depth):
+                end += 1
+            body = "\n".join(x[depth:] for x in lines[k:end]).rstrip() + "\n"
+            yield Block(page, k + 1, "sh" if COMMANDS.match(body) else "yaml", body, remarks)
+            k, remarks, after_blank = end, {}, True
+            continue
+        remark = re.match(r" *<!-- ([a-z ]+?)(?:: (.*?))? -->$", line)
+        if remark:
+            remarks[remark[1]] = remark[2] or ""
+        elif line.strip():
+            remarks = {}
+            at_list = bool(re.match(r" *(\d+\.|[-*]) ", line)) or (at_list and depth > 0)
+        after_blank = not line.strip() or remark is not None
+        k += 1
+
+
+def run(block, folder, words, given=""):
+    environment = {**os.environ, "PYTHONPATH": str(build / "python"), "PYTHONDONTWRITEBYTECODE": "1",
+                   "PATH": f"{programs}:{os.environ['PATH']}"}
+    done = subprocess.run(words, input=given, text=True, capture_output=True, cwd=folder, env=environment)
     if done.returncode != 0:
-        fail(page, line, f"the block ends with status {done.returncode}:\n{done.stdout[-500:]}{done.stderr[-1500:]}")
-
-
-def run_block(page, line, language, code):
-    if language == "python" and (build / "python/myohorizon/_binding.py").exists():
-        counts["python"] += 1
-        run(page, line, ["/usr/bin/python3", "-"], code)
-    octave = shutil.which("octave-cli")
-    if language == "octave" and octave and (build / "matlab/mhe_gateway.mex").exists():
-        counts["octave"] += 1
-        run(page, line, [octave, "--norc", "--no-gui", "--path", str(build / "matlab"), "--eval", code], "")
+        block.fail(f"ends with status {done.returncode}:\n{done.stdout[-500:]}{done.stderr[-1500:]}")
 
 
 def help_of(program):
@@ -50,71 +95,108 @@ def help_of(program):
     return helps[program]
 
 
-def check_command(page, line, text):
-    try:
-        words = shlex.split(text, comments=True)
-    except ValueError:
-        return  # a formula
-    while words and re.fullmatch(r"[A-Z_]+=.*", words[0]):
-        words = words[1:]
-    name = Path(words[0]).name if words else ""
-    if not name.startswith("mhe-"):
-        return
-    if not (programs / name).exists():
-        fail(page, line, f"there is no program {name}")
-        return
-    counts["command"] += 1
-    for word in words[1:]:
-        if word.startswith("--") and not re.search(rf"{re.escape(word)}\b", help_of(name)):
-            fail(page, line, f"{name} knows no {word}")
-        if word.startswith("models/") and not (source / word).exists():
-            fail(page, line, f"there is no {word}")
-    configs = [word for word in words[1:] if word.startswith("models/") and word.endswith(".yaml")]
-    if name == "mhe-run" and len(configs) == 1 and "--describe" not in words:
-        sets = [x for i, word in enumerate(words) if word == "--set" for x in ("--set", words[i + 1])]
-        done = subprocess.run([programs / name, "--check", configs[0], *sets], cwd=source, capture_output=True, text=True)
-        counts["checked"] += 1
-        if done.returncode != 0:
-            fail(page, line, f"{text}: {done.stderr.strip()}")
-
-
-def read(page):
-    text = (source / page).read_text()
-    lines = text.splitlines()
-    number, left_out = 0, False
-    while number < len(lines):
-        line = lines[number]
-        fence = re.match(r" *```(\w*)", line)
-        if fence:
-            end = next(k for k in range(number + 1, len(lines)) if lines[k].strip() == "```")
-            if not left_out:
-                run_block(page, number + 1, fence[1], "\n".join(lines[number + 1:end]) + "\n")
-            number, left_out = end + 1, False
+def commands_of(text):
+    for line in text.replace("\\\n", " ").splitlines():
+        try:
+            words = shlex.split(line, comments=True)
+        except ValueError:
             continue
-        if line.startswith("    ") and line.strip():
-            begin, command = number, line.strip()
-            while command.endswith("\\") and number + 1 < len(lines):
-                number += 1
-                command = command[:-1] + " " + lines[number].strip()
-            if not left_out:
-                check_command(page, begin + 1, command)
-        elif line.strip():
-            left_out = line.startswith("<!-- not run:")
-        number += 1
+        while words and re.fullmatch(r"[A-Z_]+=.*", words[0]):
+            words = words[1:]
+        if words and Path(words[0]).name.startswith("mhe-"):
+            yield Path(words[0]).name, words[1:]
+
+
+def look_at_commands(block):
+    """Programs, options and files of what is not run."""
+    for name, words in commands_of(block.text):
+        if not (programs / name).exists():
+            block.fail(f"there is no program {name}")
+            continue
+        for word in words:
+            if word.startswith("--") and not re.search(rf"{re.escape(word)}\b", help_of(name)):
+                block.fail(f"{name} knows no {word}")
+            if word.startswith("models/") and "*" not in word and not (source / word).exists():
+                block.fail(f"there is no {word}")
+        counts["commands looked at"] += 1
+
+
+def run_commands(block, folder):
+    if re.match(r"octave\b", block.text) and not shutil.which("octave"):
+        counts["skipped"] += 1
+        return
+    text = block.text
+    if "with" in block.remarks:
+        text = re.sub(r"^(\S*(?:mhe-\w+|octave)\b.*?)( +#.*)?$", lambda m: f"{m[1]} {block.remarks['with']}", text, flags=re.M)
+    run(block, folder, ["bash", "-eu", "-o", "pipefail", "-c", text])
+    counts["commands run"] += 1
+
+
+def check_yaml(block, folder):
+    try:
+        config = yaml.safe_load(block.text)
+    except yaml.YAMLError as error:
+        block.fail(f"this is no YAML, and no command: {error}")
+        return
+    counts["configs"] += 1
+    if "like" in block.remarks:
+        sets = [word for key, value in config.items() for word in ("--set", f"{key}={json.dumps(value)}")]
+        run(block, folder, [programs / "mhe-run", "--check", block.remarks["like"], *sets])
+        return
+    name = block.remarks.get("save", "config.yaml")
+    (folder / name).write_text(block.text)
+    if "do" in block.remarks:
+        run(block, folder, ["bash", "-euc", block.remarks["do"]])
+    else:
+        run(block, folder, [programs / "mhe-run", "--check", name])
+
+
+def do(block, folder):
+    if "not run" in block.remarks:
+        look_at_commands(block)
+        counts["not run"] += 1
+    elif "file" in block.remarks:
+        counts["compiled elsewhere"] += 1
+        if not (source / block.remarks["file"]).exists():
+            block.fail(f"there is no {block.remarks['file']}")
+    elif block.kind == "sh":
+        run_commands(block, folder)
+    elif block.kind == "yaml":
+        check_yaml(block, folder)
+    elif block.kind in ("csv", "json") and "save" in block.remarks:
+        (folder / block.remarks["save"]).write_text(block.text)
+    elif block.kind == "python":
+        if not (build / "python/myohorizon/_binding.py").exists():
+            counts["skipped"] += 1
+            return
+        run(block, folder, ["/usr/bin/python3", "-"], block.text)
+        counts["python"] += 1
+    elif block.kind == "octave":
+        if not shutil.which("octave-cli") or not (build / "matlab/mhe_gateway.mex").exists():
+            counts["skipped"] += 1
+            return
+        run(block, folder, ["octave-cli", "--norc", "--no-gui", "--path", str(build / "matlab"), "--eval", block.text])
+        counts["octave"] += 1
+    elif block.kind != "text":
+        block.fail(f"a block of '{block.kind}' says nothing of what it is (tests/docs/snippets.py)")
 
 
 def main():
-    work = tempfile.mkdtemp()
-    os.environ["XDG_CACHE_HOME"] = work
-    pages = ["README.md", *sorted(f"docs/{page.name}" for page in (source / "docs").glob("*.md"))]
-    for page in pages:
-        read(page)
-    shutil.rmtree(work)
-    print(", ".join(f"{n} {what}" for what, n in counts.items()))
+    work = Path(tempfile.mkdtemp())
+    os.environ["XDG_CACHE_HOME"] = str(work / "cache")
+    pages = sys.argv[3:] or ["README.md", *sorted(f"docs/{page.name}" for page in (source / "docs").glob("*.md"))]
+    try:
+        for page in pages:
+            folder = scene.make(work / Path(page).stem, Path(page).name, source, build)
+            for block in blocks_of(page, (source / page).read_text()):
+                do(block, folder)
+    finally:
+        shutil.rmtree(work)
+    print(", ".join(f"{n} {what}" for what, n in sorted(counts.items())))
     if failures:
         sys.exit("\n".join(failures))
-    if counts["command"] == 0:
-        sys.exit("no commands were found")
+    if not sys.argv[3:] and not all(counts[what] > 3 for what in ("commands run", "commands looked at", "configs")):
+        sys.exit("the blocks are not found")
 
 
 main()
