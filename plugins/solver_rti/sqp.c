@@ -144,8 +144,7 @@ static int32_t verdict(const rti_solver *s, const mhe_solve_control *control, in
         return MHE_SOLVE_ITERATION_LIMIT;
     }
     /* The next iteration will take about as long as the last one. */
-    if ((isfinite(s->deadline) && rti_now() + s->iteration_time >= s->deadline) ||
-        rti_is_spent(s, 0)) {
+    if (rti_is_late(s, s->iteration_time) || rti_is_spent(s, 0)) {
         return MHE_SOLVE_DEADLINE;
     }
     return -1;
@@ -304,7 +303,7 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
     s->leap = (rti_leap){0};
     s->control = control;
     s->deadline = control != NULL && control->deadline > 0 ? control->deadline : INFINITY;
-    if (isfinite(s->deadline) && rti_now() >= s->deadline) { /* at once */
+    if (rti_is_late(s, 0)) { /* at once */
         info->outcome = MHE_SOLVE_DEADLINE;
         info->primal_residual = s->prepared ? largest_gap(s) : INFINITY;
         return MHE_OK;

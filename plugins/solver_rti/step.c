@@ -19,13 +19,20 @@ int32_t rti_is_spent(const rti_solver *s, int32_t steps) {
     return control != NULL && control->spent != NULL && control->spent(control->budget, steps);
 }
 
-static int32_t rti_is_late(const rti_solver *s, int32_t steps) {
-    return rti_is_spent(s, steps) || (isfinite(s->deadline) && rti_now() >= s->deadline);
+int32_t rti_is_late(const rti_solver *s, double seconds) {
+    const mhe_solve_control *control = s->control;
+    return control != NULL && control->late != NULL
+               ? control->late(control->budget, seconds)
+               : isfinite(s->deadline) && rti_now() + seconds >= s->deadline;
+}
+
+static int32_t is_over(const rti_solver *s, int32_t steps) {
+    return rti_is_spent(s, steps) || rti_is_late(s, 0);
 }
 
 /* Before each interior-point step. */
 static int32_t is_late(const void *data) {
-    return rti_is_late(data, 1);
+    return is_over(data, 1);
 }
 
 /* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
@@ -233,7 +240,7 @@ int32_t rti_step_full(rti_solver *s) {
         if (s->failure != MHE_OK) {
             break;
         }
-        if (rti_is_late(s, 0)) {
+        if (is_over(s, 0)) {
             return RTI_LATE;
         }
     }
@@ -333,7 +340,7 @@ static double search(rti_solver *s, double slope) {
         if (rti_evaluate(s, &s->trial, RTI_DYNAMICS | RTI_COSTS) && is_better(s, length, slope)) {
             return rti_evaluate(s, &s->trial, RTI_ALL) ? length : 0;
         }
-        if (s->failure != MHE_OK || rti_is_late(s, 0)) {
+        if (s->failure != MHE_OK || is_over(s, 0)) {
             return 0;
         }
     }
@@ -357,10 +364,10 @@ static double try_step(rti_solver *s, int32_t result) {
     if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
         return 1;
     }
-    if (known && result == QP_SOLVED && !rti_is_late(s, 0) && second_look(s, slope)) {
+    if (known && result == QP_SOLVED && !is_over(s, 0) && second_look(s, slope)) {
         return 1;
     }
-    return s->failure == MHE_OK && !rti_is_late(s, 0) ? search(s, slope) : 0;
+    return s->failure == MHE_OK && !is_over(s, 0) ? search(s, slope) : 0;
 }
 
 int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
@@ -381,7 +388,7 @@ int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
         if (s->failure != MHE_OK) {
             break;
         }
-        if (rti_is_late(s, 0)) {
+        if (is_over(s, 0)) {
             return RTI_LATE;
         }
         if (result == QP_INFEASIBLE) {

@@ -130,6 +130,10 @@ typedef struct mhe_solve_control {
      * all stages) done since it was last asked; evaluate() counts for itself. Not while evaluate()
      * runs. May be NULL. */
     int32_t (*spent)(void *budget, int32_t steps);
+    /* Not 0: the deadline is nearer than `seconds`. Where it is given, it is asked instead of the
+     * clock (a replay answers what was answered once, whatever the clock says), on the thread that
+     * called solve() and not while evaluate() runs. May be NULL. */
+    int32_t (*late)(void *budget, double seconds);
 } mhe_solve_control;
 
 typedef struct mhe_solve_info {
