@@ -27,6 +27,7 @@ if(MHE_FUZZ)
 endif()
 
 find_package(PkgConfig REQUIRED)
+pkg_check_modules(CJSON REQUIRED IMPORTED_TARGET libcjson) # of the programs mhe-bench and mhe-study, and of tests
 
 set_property(GLOBAL PROPERTY MHE_PLUGINS_BUILT "")
 set_property(GLOBAL PROPERTY MHE_PLUGINS_SKIPPED "")

@@ -37,6 +37,23 @@ function(mhe_test name)
     mhe_test_environment(${name})
 endfunction()
 
+# mhe_plugin_test(<name> LABEL <label> SOURCES <files> [LIBRARIES <targets>] [PLUGINS <targets>]): called in a plugin's folder,
+# whose tests lie in tests/. They load the plugin through the registry and never link it; a part that needs nothing of
+# the rest is compiled into its test.
+function(mhe_plugin_test name)
+    if(NOT MHE_BUILD_TESTS)
+        return()
+    endif()
+    cmake_parse_arguments(arg "" "" "PLUGINS" ${ARGN})
+    if(NOT arg_PLUGINS)
+        get_filename_component(folder ${CMAKE_CURRENT_SOURCE_DIR} NAME)
+        set(arg_PLUGINS mhe_${folder})
+    endif()
+    mhe_test(${name} ${arg_UNPARSED_ARGUMENTS})
+    target_include_directories(test_${name} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR})
+    add_dependencies(test_${name} ${arg_PLUGINS})
+endfunction()
+
 # mhe_public_test(<name> SOURCES <files>): the same against libmhe.so and the public headers alone, as an application
 # would be built.
 function(mhe_public_test name)

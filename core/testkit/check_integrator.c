@@ -122,6 +122,8 @@ static mhe_system make_system(const kind *k, pendulum *p) {
                         .n_z = k->n_z,
                         .n_r = k->n_r,
                         .n_k = k->n_z,
+                        .first_d = 2,
+                        .first_z = 2 + k->n_d,
                         .z_muscle = z_muscle,
                         .z_of = z_of,
                         .data = p,

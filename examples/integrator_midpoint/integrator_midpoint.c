@@ -99,7 +99,7 @@ static mhe_status rates(context *c, const double *x, const double *u, const doub
                         double *F, double *G, mhe_error *err) {
     const mhe_system *s = c->of->system;
     const int32_t n_x = s->n_x, n_u = s->n_u, n_q = s->n_q, n_d = s->n_d, n_r = s->n_r;
-    const double *d = n_d > 0 ? x + 2 * n_q : NULL, *r = n_r > 0 ? u + s->n_m : NULL;
+    const double *d = n_d > 0 ? x + s->first_d : NULL, *r = n_r > 0 ? u + s->n_m : NULL;
     const mhe_system_point at = {.size = sizeof at,
                                  .q = x,
                                  .v = x + n_q,
@@ -116,7 +116,7 @@ static mhe_status rates(context *c, const double *x, const double *u, const doub
     }
     mhe_status status = s->acceleration(s, c->system_context, &at, &out, err);
     if (status == MHE_OK && n_d > 0) {
-        status = s->activation_rate(s, u, d, f + 2 * n_q, F != NULL ? c->rate_c : NULL,
+        status = s->activation_rate(s, u, d, f + s->first_d, F != NULL ? c->rate_c : NULL,
                                     F != NULL ? c->rate_d : NULL, err);
     }
     if (status != MHE_OK) {
@@ -133,15 +133,15 @@ static mhe_status rates(context *c, const double *x, const double *u, const doub
         F[i * n_x + n_q + i] = 1;
         memcpy(row, c->vdot_q + i * n_q, sizeof(double) * (size_t)n_q);
         memcpy(row + n_q, c->vdot_v + i * n_q, sizeof(double) * (size_t)n_q);
-        memcpy(n_d > 0 ? row + 2 * n_q : row_u, c->vdot_a + i * s->n_a,
+        memcpy(n_d > 0 ? row + s->first_d : row_u, c->vdot_a + i * s->n_a,
                sizeof(double) * (size_t)s->n_a);
         if (n_r > 0) {
             memcpy(row_u + s->n_m, c->vdot_r + i * n_r, sizeof(double) * (size_t)n_r);
         }
     }
     for (int32_t i = 0; i < n_d; i++) {
-        F[(2 * n_q + i) * n_x + 2 * n_q + i] = c->rate_d[i];
-        G[(2 * n_q + i) * n_u + i] = c->rate_c[i];
+        F[(s->first_d + i) * n_x + s->first_d + i] = c->rate_d[i];
+        G[(s->first_d + i) * n_u + i] = c->rate_c[i];
     }
     return MHE_OK;
 }

@@ -98,7 +98,7 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
     const struct rk *rk = self;
     const mhe_system *system = rk->system;
     size_t n_q = (size_t)system->n_q, n_m = (size_t)system->n_m, pad = (size_t)rk->pad;
-    size_t s = (size_t)rk->mechanics.stages;
+    size_t s = (size_t)rk->mechanics.stages, two = (size_t)system->first_d;
     size_t columns = (size_t)(system->n_x + system->n_u + system->n_p), n_z = (size_t)system->n_z;
     size_t wide = n_z > 0 ? columns : 0;
     double *slot, *trace;
@@ -135,11 +135,11 @@ static mhe_status rk_context_create(const void *self, void *system_context, void
                   {&slot, (size_t)rk_slot_size(rk)},
                   {&trace, (size_t)rk_trace_size(rk)},
                   {&c->weights, RK_WEIGHED * (RK_WEIGHED + 1) / 2 * s * RK_ACTIVATION_STAGES},
-                  {&c->direct, 2 * n_q * (n_m > n_q ? n_m : n_q)},
-                  {&c->adjoint, 2 * n_q * s * n_q},
-                  {&c->carry, 2 * n_q * 2 * n_q},
-                  {&c->sens, (2 * n_q + n_z) * columns},
-                  {&c->sens_next, 2 * n_q * (columns - wide)},
+                  {&c->direct, two * (n_m > n_q ? n_m : n_q)},
+                  {&c->adjoint, two * s * n_q},
+                  {&c->carry, two * two},
+                  {&c->sens, (two + n_z) * columns},
+                  {&c->sens_next, two * (columns - wide)},
                   {&c->z, n_z},
                   {&c->Z, s * n_z},
                   {&c->H, s * n_z},
@@ -189,7 +189,7 @@ static void rk_begin(struct rk_context *c, const double *x, const double *u) {
     size_t bytes_q = sizeof(double) * (size_t)n_q, bytes_m = sizeof(double) * (size_t)n_m;
     memcpy(c->q, x, bytes_q);
     memcpy(c->v, x + n_q, bytes_q);
-    memcpy(c->a, system->n_d > 0 ? x + 2 * n_q : u, bytes_m);
+    memcpy(c->a, system->n_d > 0 ? x + system->first_d : u, bytes_m);
     rk_fill(c->a_a, n_m, 1);
     rk_fill(c->a_e, n_m, 0);
     if (system->n_d == 0) {
@@ -199,36 +199,37 @@ static void rk_begin(struct rk_context *c, const double *x, const double *u) {
         }
         rk_fill(c->stage_a_e, s * n_m, 1);
     }
-    memcpy(c->z, x + 2 * n_q + system->n_d, sizeof(double) * (size_t)system->n_z);
+    memcpy(c->z, x + system->first_z, sizeof(double) * (size_t)system->n_z);
     c->step = 0;
 }
 
 /* Splits the carried derivatives into A and B. */
 static void rk_derivatives(const struct rk_context *c, double *A, double *B) {
     const mhe_system *system = c->rk->system;
-    int32_t n_q = system->n_q, n_d = system->n_d, n_x = system->n_x, n_u = system->n_u;
-    for (int32_t i = 0; i < 2 * n_q; i++) {
+    int32_t first_d = system->first_d, first_z = system->first_z;
+    int32_t n_d = system->n_d, n_x = system->n_x, n_u = system->n_u;
+    for (int32_t i = 0; i < first_d; i++) {
         const double *row = c->sens + i * c->columns;
         memcpy(A + i * n_x, row, sizeof(double) * (size_t)n_x);
         memcpy(B + i * n_u, row + n_x, sizeof(double) * (size_t)n_u);
     }
-    memset(A + 2 * n_q * n_x, 0, sizeof(double) * (size_t)(n_d * n_x));
-    memset(B + 2 * n_q * n_u, 0, sizeof(double) * (size_t)(n_d * n_u));
+    memset(A + first_d * n_x, 0, sizeof(double) * (size_t)(n_d * n_x));
+    memset(B + first_d * n_u, 0, sizeof(double) * (size_t)(n_d * n_u));
     for (int32_t i = 0; i < n_d; i++) {
-        A[(2 * n_q + i) * n_x + 2 * n_q + i] = c->a_a[i];
-        B[(2 * n_q + i) * n_u + i] = c->a_e[i];
+        A[(first_d + i) * n_x + first_d + i] = c->a_a[i];
+        B[(first_d + i) * n_u + i] = c->a_e[i];
     }
     for (int32_t i = 0; i < system->n_z; i++) {
-        const double *row = c->sens + (2 * n_q + i) * c->columns;
-        memcpy(A + (2 * n_q + n_d + i) * n_x, row, sizeof(double) * (size_t)n_x);
-        memcpy(B + (2 * n_q + n_d + i) * n_u, row + n_x, sizeof(double) * (size_t)n_u);
+        const double *row = c->sens + (first_d + i) * c->columns;
+        memcpy(A + (first_z + i) * n_x, row, sizeof(double) * (size_t)n_x);
+        memcpy(B + (first_z + i) * n_u, row + n_x, sizeof(double) * (size_t)n_u);
     }
 }
 
 /* The same of the columns of the parameters; activations see none. */
 static void rk_parameters(const struct rk_context *c, double *P) {
     const mhe_system *system = c->rk->system;
-    int32_t two = 2 * system->n_q, n_d = system->n_d, n_p = system->n_p;
+    int32_t two = system->first_d, n_d = system->n_d, n_p = system->n_p;
     size_t bytes = sizeof(double) * (size_t)n_p;
     for (int32_t i = 0; i < two + system->n_z; i++) {
         const double *row = c->sens + i * c->columns + system->n_x + system->n_u;
@@ -255,8 +256,8 @@ static mhe_status rk_step(void *context, const double *x, const double *u, const
     }
     memcpy(x_next, c->q, sizeof(double) * (size_t)n_q);
     memcpy(x_next + n_q, c->v, sizeof(double) * (size_t)n_q);
-    memcpy(x_next + 2 * n_q, c->a, sizeof(double) * (size_t)system->n_d);
-    memcpy(x_next + 2 * n_q + system->n_d, c->z, sizeof(double) * (size_t)system->n_z);
+    memcpy(x_next + system->first_d, c->a, sizeof(double) * (size_t)system->n_d);
+    memcpy(x_next + system->first_z, c->z, sizeof(double) * (size_t)system->n_z);
     if (derivatives) {
         rk_derivatives(c, out->A, out->B);
         if (out->P != NULL && system->n_p > 0) {

@@ -14,7 +14,7 @@
  * to (q+, v+). */
 static void rk_adjoint(struct rk_context *c, double h) {
     const struct rk_tableau *t = &c->rk->mechanics;
-    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, two = 2 * n_q;
+    int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q, two = c->rk->system->first_d;
     memset(c->adjoint, 0, sizeof(double) * (size_t)(n * two));
     for (int32_t j = 0; j < s; j++) {
         for (int32_t i = 0; i < n_q; i++) {
@@ -29,7 +29,7 @@ static void rk_adjoint(struct rk_context *c, double h) {
 /* The transpose of d(q+, v+)/d(q, v) of this step. */
 static void rk_carry(struct rk_context *c, double h) {
     const struct rk_tableau *t = &c->rk->mechanics;
-    int32_t n_q = c->rk->system->n_q, s = t->stages, two = 2 * n_q;
+    int32_t n_q = c->rk->system->n_q, s = t->stages, two = c->rk->system->first_d;
     double *by_q = c->carry, *by_v = by_q + n_q * two;
     memset(c->carry, 0, sizeof(double) * (size_t)(two * two));
     for (int32_t i = 0; i < n_q; i++) {
@@ -55,7 +55,7 @@ static void rk_carry(struct rk_context *c, double h) {
 static void rk_direct(struct rk_context *c) {
     const mhe_system *system = c->rk->system;
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_d = system->n_d;
-    int32_t n_p = system->n_p, two = 2 * n_q, columns = c->columns;
+    int32_t n_p = system->n_p, two = system->first_d, columns = c->columns;
     int32_t of_a = two, of_e = of_a + n_d, of_r = of_e + n_m, of_p = of_r + n_r;
     for (int32_t j = 0; j < c->rk->mechanics.stages; j++) {
         const double *stage_a_a = c->stage_a_a + j * n_m, *stage_a_e = c->stage_a_e + j * n_m;
@@ -85,7 +85,7 @@ static void rk_direct(struct rk_context *c) {
 }
 
 CLONES static void rk_chain_rows(struct rk_context *c, double h) {
-    int32_t two = 2 * c->rk->system->n_q, columns = c->columns;
+    int32_t two = c->rk->system->first_d, columns = c->columns;
     rk_adjoint(c, h);
     rk_carry(c, h);
     memset(c->sens_next, 0, sizeof(double) * (size_t)(two * columns));

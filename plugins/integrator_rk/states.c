@@ -261,7 +261,7 @@ CLONES static void rk_state_direct(struct rk_context *c, double h, int32_t j, do
     const mhe_system *system = c->rk->system;
     const struct rk_slot *at = c->at;
     int32_t n_q = system->n_q, n_z = system->n_z, n_m = system->n_m, n_r = system->n_r;
-    int32_t n = c->columns, first_d = 2 * n_q, first_u = system->n_x;
+    int32_t n = c->columns, first_d = system->first_d, first_u = system->n_x;
     const double *q = c->sens, *v = c->sens + n_q * n;
     double ch = h * c->rk->mechanics.c[j];
     memset(R, 0, sizeof(double) * (size_t)(n_q * n));
@@ -313,13 +313,13 @@ CLONES static void rk_state_direct(struct rk_context *c, double h, int32_t j, do
 /* At the start of an interval the states are the columns. */
 static void rk_state_identity(struct rk_context *c) {
     const mhe_system *system = c->rk->system;
-    int32_t n_q = system->n_q, n = c->columns;
-    memset(c->sens, 0, sizeof(double) * (size_t)((2 * n_q + system->n_z) * n));
-    for (int32_t i = 0; i < 2 * n_q; i++) {
+    int32_t two = system->first_d, n = c->columns;
+    memset(c->sens, 0, sizeof(double) * (size_t)((two + system->n_z) * n));
+    for (int32_t i = 0; i < two; i++) {
         c->sens[i * n + i] = 1;
     }
     for (int32_t p = 0; p < system->n_z; p++) {
-        c->sens[(2 * n_q + p) * n + 2 * n_q + system->n_d + p] = 1;
+        c->sens[(two + p) * n + system->first_z + p] = 1;
     }
 }
 

@@ -18,12 +18,12 @@ static mhe_status flow_evaluate(struct flow_context *c, const double *x, double 
                                 double *zdot, int32_t derivatives) {
     const mhe_system *system = c->flow->system;
     const int32_t n_q = system->n_q, n_d = system->n_d;
-    const double *d = x + 2 * n_q;
+    const double *d = x + system->first_d;
     const mhe_system_point at = {.size = sizeof at,
                                  .q = x,
                                  .v = x + n_q,
                                  .a = n_d > 0 ? d : (system->n_a > 0 ? c->u : NULL),
-                                 .z = system->n_z > 0 ? d + n_d : NULL,
+                                 .z = system->n_z > 0 ? x + system->first_z : NULL,
                                  .c = c->u,
                                  .r = system->n_r > 0 ? c->u + system->n_m : NULL,
                                  .w = c->w};
@@ -54,12 +54,14 @@ static mhe_status flow_evaluate(struct flow_context *c, const double *x, double 
 
 int flow_rate(sunrealtype t, N_Vector x, N_Vector xdot, void *data) {
     struct flow_context *c = data;
-    const int32_t n_q = c->flow->system->n_q;
+    const mhe_system *system = c->flow->system;
+    const int32_t n_q = system->n_q;
     const double *from = N_VGetArrayPointer(x);
-    double *to = N_VGetArrayPointer(xdot), *d = to + 2 * n_q;
+    double *to = N_VGetArrayPointer(xdot);
     (void)t;
     memcpy(to, from + n_q, sizeof(double) * (size_t)n_q);
-    return flow_answer(c, flow_evaluate(c, from, to + n_q, d, d + c->flow->system->n_d, 0));
+    return flow_answer(
+        c, flow_evaluate(c, from, to + n_q, to + system->first_d, to + system->first_z, 0));
 }
 
 /* Rows of z in the Jacobian; `d` and `z` are the places of activations and z in x. */
@@ -86,7 +88,7 @@ int flow_jacobian(sunrealtype t, N_Vector x, N_Vector xdot, SUNMatrix J, void *d
     struct flow_context *c = data;
     const mhe_system *system = c->flow->system;
     const int32_t n_q = system->n_q, n_a = system->n_a, n_z = system->n_z;
-    const int32_t d = 2 * n_q, z = d + system->n_d;
+    const int32_t d = system->first_d, z = system->first_z;
     (void)t, (void)xdot, (void)a, (void)b, (void)e;
     mhe_status status = flow_evaluate(c, N_VGetArrayPointer(x), c->vdot, c->rate, c->zdot, 1);
     if (status != MHE_OK) {
@@ -126,8 +128,8 @@ static void flow_apply(const struct flow_context *c, const double *s, double *ou
     const mhe_system *system = c->flow->system;
     const int32_t n_q = system->n_q, n_a = system->n_a, n_d = system->n_d, n_z = system->n_z;
     const int32_t n_k = system->n_k;
-    const double *s_d = s + 2 * n_q, *s_z = s_d + n_d;
-    double *out_d = out + 2 * n_q, *out_z = out_d + n_d;
+    const double *s_d = s + system->first_d, *s_z = s + system->first_z;
+    double *out_d = out + system->first_d, *out_z = out + system->first_z;
     memcpy(out, s + n_q, sizeof(double) * (size_t)n_q);
     for (int32_t i = 0; i < n_q; i++) {
         double sum = 0;
@@ -159,13 +161,13 @@ static void flow_add_control(const struct flow_context *c, int32_t k, double *ou
     const mhe_system *system = c->flow->system;
     const int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_k = system->n_k;
     const int32_t driven = system->n_a > 0 && system->n_d == 0; /* by activations */
-    double *z = out + 2 * n_q + system->n_d;
+    double *z = out + system->first_z;
     for (int32_t j = 0; j < n_k && k < n_m && system->z_of[k * n_k + j] >= 0; j++) {
         const int32_t i = system->z_of[k * n_k + j];
         z[i] += c->z_c[i] + (driven ? c->z_a[i] : 0);
     }
     if (k < n_m && system->n_d > 0) {
-        out[2 * n_q + k] += c->rate_e[k];
+        out[system->first_d + k] += c->rate_e[k];
     }
     for (int32_t i = 0; i < n_q && (k >= n_m || driven); i++) {
         out[n_q + i] += k < n_m ? c->f_a[i * n_m + k] : c->f_r[i * n_r + k - n_m];
@@ -176,7 +178,7 @@ static void flow_add_control(const struct flow_context *c, int32_t k, double *ou
 static void flow_add_parameter(const struct flow_context *c, int32_t k, double *out) {
     const mhe_system *system = c->flow->system;
     const int32_t n_q = system->n_q, n_p = system->n_p;
-    double *z = out + 2 * n_q + system->n_d;
+    double *z = out + system->first_z;
     for (int32_t i = 0; i < n_q; i++) {
         out[n_q + i] += c->f_p[i * n_p + k];
     }

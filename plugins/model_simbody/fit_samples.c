@@ -105,7 +105,8 @@ static double path_jump(const mhe_description *d, const samples *s, void *contex
 mhe_status samples_jumps(const mhe_description *d, const samples *s, void *model, path_fits *fits,
                          mhe_error *err) {
     void *context = NULL;
-    double *scratch = calloc((size_t)(s->n_p + 2 * s->n_q) + 1, sizeof *scratch);
+    const size_t n = (size_t)(s->n_p + s->n_q + s->n_q); /* lengths, a pose, its velocities */
+    double *scratch = calloc(n + 1, sizeof *scratch);
     mhe_status status = scratch == NULL ? mhe_fail(err, MHE_E_MEMORY, "no memory to fit paths")
                                         : simbody_context_create(model, &context, err);
     for (int32_t i = 0; i < s->n_p && status == MHE_OK; i++) {

@@ -19,7 +19,8 @@ from .catalogue import describe, plugins, version
 from .costs import Cost
 from .errors import (ArgumentError, ClosedError, ConfigError, Error, InputError, Interrupted, NumericError, OutputError,
                      PluginError, ThreadError, UnsupportedError)
-from .estimator import Estimate, Estimator
+from .estimate import Estimate
+from .estimator import Estimator
 from .live import Live
 from .model import Model
 from .results import Finding, Results, check_config, run

@@ -1,189 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The estimator, frame by frame, and what it hands back."""
+"""The estimator, frame by frame."""
 import threading
-from collections.abc import Mapping
 
 import numpy as np
 
+from ._arrays import DOUBLE, copied, doubles
 from ._config import Config
 from ._library import check, encode, ffi, lib, names, new_error, text
-from .errors import ArgumentError, ClosedError, ThreadError
+from ._turn import Turn
+from .errors import ArgumentError, ClosedError
+from .estimate import PHASE, Estimate, Shape
 
-STATUS = ("ok", "iteration_limit", "deadline", "predicted", "restarted")
-PHASE = ("empty", "filling", "beginning", "settling", "running")
 WHY = ("used", "missing", "far", "saturated", "unread")
-
-_DOUBLE = np.dtype(np.float64)
-
-# Quantities of an estimate with their units, in the order of its numbers.
-UNITS = {"q": "rad (m)", "qdot": "rad/s (m/s)", "activation": "1", "excitation": "1", "force": "N",
-         "moment": "N m (N)", "residual": "N m (N)", "markers": "m"}
-
-
-class Shape:
-    """Which quantities an estimate has, how many numbers each and under which names."""
-
-    def __init__(self, info):
-        self.coordinates = names(info.coordinate_names, info.n_q)
-        self.muscles = names(info.muscle_names, info.n_muscles)
-        self.markers = names(info.marker_names, info.n_markers)
-        n_q, n_m = info.n_q, info.n_muscles
-        sizes = {"q": n_q, "qdot": n_q, "activation": n_m, "force": n_m, "moment": n_q}
-        if info.formulation == lib.MHE_FORMULATION_EXCITATION:
-            sizes["excitation"] = n_m
-        if info.n_residual_torques > 0:
-            sizes["residual"] = info.n_residual_torques
-        if info.n_markers > 0:
-            sizes["markers"] = 3 * info.n_markers
-        self.places = {}
-        self.size = 0
-        for name in UNITS:
-            if name in sizes:
-                shape = (info.n_markers, 3) if name == "markers" else (sizes[name],)
-                self.places[name] = (self.size, self.size + sizes[name], shape)
-                self.size += sizes[name]
-        block = ffi.NULL
-        for i in range(info.layout.n_blocks):
-            block = info.layout.blocks + i  # of this header's size: the library is of the same version
-            if text(block.name) == "residual_torque":
-                self.residuals = names(block.entry_names, block.count)
-                break
-        else:
-            self.residuals = ()
-
-    def labels(self, name):
-        """Names of the numbers of a quantity: coordinates, muscles, markers."""
-        if name not in self.places:
-            raise KeyError(f"an estimate has no {name!r}; it has {', '.join(self.places)}")
-        if name in ("q", "qdot", "moment"):
-            return self.coordinates
-        if name == "markers":
-            return self.markers
-        return self.residuals if name == "residual" else self.muscles
-
-    def columns(self, name):
-        """The same, a name a number: "DELT.x"."""
-        labels = self.labels(name)
-        return tuple(f"{label}.{axis}" for label in labels for axis in "xyz") if name == "markers" else labels
-
-    def copier(self, estimate):
-        """A function that copies the numbers of `estimate` to an address."""
-        moves = tuple((name, 8 * begin, 8 * (end - begin)) for name, (begin, end, _) in self.places.items())
-        memmove = ffi.memmove
-
-        def copy(to):
-            for name, offset, n in moves:
-                memmove(to + offset, getattr(estimate, name), n)
-        return copy
-
-
-class Estimate(Mapping):
-    """What is known of one moment: a mapping of numpy arrays, which are attributes too.
-
-    ==============  ===================  ======  ==========================================================
-    name            shape                unit    what
-    ==============  ===================  ======  ==========================================================
-    ``q``           [n_coordinates]      rad     coordinates (m of sliders)
-    ``qdot``        [n_coordinates]      rad/s   their velocities (m/s)
-    ``activation``  [n_muscles]          1       activations, 0 to 1
-    ``excitation``  [n_muscles]          1       excitations; excitation-driven only
-    ``force``       [n_muscles]          N       muscle forces along the tendon
-    ``moment``      [n_coordinates]      N m     joint moments by the muscles (N)
-    ``residual``    [n_residual]         N m     residual torques, where switched on (N)
-    ``markers``     [n_markers, 3]       m       positions in the ground frame of the model
-    ==============  ===================  ======  ==========================================================
-
-    Arrays are the estimate's own. Beside them, as plain numbers: ``time`` (s, of the moment that is estimated),
-    ``status`` ("ok", "iteration_limit", "deadline", "predicted", "restarted"), ``iterations``, ``kkt_residual``,
-    ``solve_time`` and ``latency`` (s), ``marker_rms`` (m), ``emg_rms`` (1; NaN without), ``phase``.
-    """
-
-    __slots__ = ("_shape", "_numbers", "time", "_status", "iterations", "kkt_residual", "solve_time", "latency",
-                 "marker_rms", "emg_rms", "_phase")
-    units = UNITS
-
-    def __init__(self, shape, numbers, e):
-        self._shape = shape
-        self._numbers = numbers
-        self.time = e.time
-        self._status = e.status
-        self.iterations = e.iterations
-        self.kkt_residual = e.kkt_residual
-        self.solve_time = e.solve_time
-        self.latency = e.latency
-        self.marker_rms = e.marker_rms
-        self.emg_rms = e.emg_rms
-        self._phase = e.phase
-
-    def __getitem__(self, name):
-        begin, end, shape = self._shape.places[name]
-        return self._numbers[begin:end].reshape(shape)
-
-    def __getattr__(self, name):
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(f"an estimate has no {name!r}; it has {', '.join(self._shape.places)}") from None
-
-    def __iter__(self):
-        return iter(self._shape.places)
-
-    def __len__(self):
-        return len(self._shape.places)
-
-    def __reduce__(self):
-        raise TypeError("an estimate is not to be pickled; dict(estimate) is")
-
-    @property
-    def status(self):
-        return STATUS[self._status]
-
-    @property
-    def phase(self):
-        return PHASE[self._phase]
-
-    def labels(self, name):
-        """Names of the entries of a quantity: coordinates, muscles or markers."""
-        return self._shape.labels(name)
-
-    def named(self, name):
-        """A quantity as a dict, {"BRA": 12.5, ...}; of markers {"DELT": array [3], ...}."""
-        values = self[name]
-        return dict(zip(self._shape.labels(name), values if values.ndim > 1 else values.tolist()))
-
-    def __repr__(self):
-        return f"<Estimate at {self.time:.4f} s, {self.status}: {', '.join(self)}>"
-
-
-def _doubles(name, values, shape, labels):
-    """An array of `shape` as float64 in C order. What has another shape or type is refused, not guessed."""
-    if isinstance(values, Mapping):
-        return _by_name(name, values, shape, labels)
-    if isinstance(values, np.ma.MaskedArray):
-        values = np.ma.filled(values.astype(_DOUBLE), np.nan)
-    try:
-        array = np.asarray(values)
-    except ValueError as error:
-        raise ArgumentError(f"{name}: {error}") from None
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name}: numbers are needed, not {array.dtype} (missing values are NaN)")
-    if array.shape != shape:
-        per = " x 3" if len(shape) > 1 else ""
-        raise ArgumentError(f"{name}: the shape is {list(array.shape)}; this model takes {list(shape)}: "
-                            f"{len(labels)}{per}, in the order {', '.join(labels[:4])}{', ...' if len(labels) > 4 else ''}")
-    return np.ascontiguousarray(array, dtype=_DOUBLE)
-
-
-def _by_name(name, values, shape, labels):
-    array = np.full(shape, np.nan)
-    for label, value in values.items():
-        if label not in labels:
-            raise ArgumentError(f"{name}: the model has no '{label}'; it has {', '.join(labels)}")
-        try:
-            array[labels.index(label)] = value
-        except (TypeError, ValueError) as error:
-            raise ArgumentError(f"{name}: '{label}': {error}") from None
-    return array
 
 
 class Estimator:
@@ -212,7 +40,8 @@ class Estimator:
 
     def __init__(self, config, *, folder=None, trust=False, functions=None, **keys):
         self._pointer = ffi.NULL
-        self._lock = threading.Lock()
+        self._turn = Turn()
+        self._end = threading.RLock()
         self._owns_config = not isinstance(config, Config)
         self._config = Config(config, keys, folder=folder, trust=trust, functions=functions) if self._owns_config else config
         self._error = new_error()
@@ -238,16 +67,6 @@ class Estimator:
         self._n_columns = 0
         self._calls_back = self._config.calls_back
 
-    # ---- one thread at a time, and not after close ----
-
-    def _enter(self):
-        if not self._lock.acquire(False):
-            raise ThreadError("this estimator is at work in another thread; one estimator belongs to one thread at a "
-                              "time")
-        if self._pointer == ffi.NULL:
-            self._lock.release()
-            raise ClosedError("the estimator is closed")
-
     def _describe(self):
         check(lib.mhe_estimator_describe(self._pointer, self._info), self._error)
         return self._info
@@ -267,7 +86,7 @@ class Estimator:
         NaN is a missing value; None: all missing. Arrays of float64 in C order are taken as they are, others are
         converted; a wrong shape is ArgumentError, what is no number TypeError.
         """
-        self._enter()
+        self._turn.enter()
         try:
             frame = self._frame
             frame.time = t
@@ -289,41 +108,41 @@ class Estimator:
             self._copy(ffi.cast("char *", ffi.from_buffer(numbers)))
             return Estimate(shape, numbers, self._estimate)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def _address(self, name, values):
         """Where the numbers of an argument lie; what is handed back keeps them there."""
         if values is None:
             return ffi.NULL
         shape, labels = self._shapes[name]
-        if not (type(values) is np.ndarray and values.dtype == _DOUBLE and values.shape == shape
+        if not (type(values) is np.ndarray and values.dtype == DOUBLE and values.shape == shape
                 and values.flags.c_contiguous):
-            values = _doubles(name, values, shape, labels)
+            values = doubles(name, values, shape, labels)
         return ffi.from_buffer("double[]", values)
 
     def prepare(self):
         """Does what can be done before the next frame is there, so that its estimate comes sooner. Results are the same
         with and without it."""
-        self._enter()
+        self._turn.enter()
         try:
             self._config.check(lib.mhe_estimator_prepare(self._pointer, self._error), self._error)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def measure(self, channel, t, values):
         """A measurement of one channel ("markers", "emg", "angles", or another of `channels`) at a time of its own, s,
         earlier or later than the newest frame: it goes to the node of its time while that is in the window."""
-        self._enter()
+        self._turn.enter()
         try:
             number = lib.mhe_estimator_find_channel(self._pointer, encode(channel))
             if number < 0:
                 raise ArgumentError(f"there is no channel '{channel}'; there are {', '.join(self._channel_names())}")
             row = lib_channel(self._describe(), number)
-            values = _doubles(channel, values, (row.width,), names(row.columns, row.width))
+            values = doubles(channel, values, (row.width,), names(row.columns, row.width))
             check(lib.mhe_estimator_measure(self._pointer, number, t, ffi.from_buffer("double[]", values), self._error),
                   self._error)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def open_emg(self, columns, rate):
         """From now on raw EMG of electrodes comes by push_emg, and the section `emg` of the config makes muscles' EMG of
@@ -332,37 +151,37 @@ class Estimator:
         if isinstance(columns, str):
             raise TypeError("columns: a list of names is needed, not one text")
         words = [ffi.new("char[]", encode(column)) for column in columns]
-        self._enter()
+        self._turn.enter()
         try:
             check(lib.mhe_estimator_open_emg(self._pointer, ffi.new("char *[]", words), len(words), rate, self._error), self._error)
             self._n_columns = len(words)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def push_emg(self, t, raw):
         """Raw EMG: one sample [n_columns] at time t (s), or several: t [n], raw [n, n_columns]. In the columns' units,
         NaN where missing."""
-        self._enter()
+        self._turn.enter()
         try:
             n = self._n_columns
             if n == 0:
                 raise ArgumentError("raw EMG has no columns yet: open_emg(columns, rate) comes first")
-            times = np.atleast_1d(np.asarray(t, dtype=_DOUBLE))
+            times = np.atleast_1d(np.asarray(t, dtype=DOUBLE))
             shape = (times.size, n) if np.ndim(raw) == 2 else (n,)
-            rows = _doubles("raw", raw, shape, ("columns",) * n).reshape(-1, n)
+            rows = doubles("raw", raw, shape, ("columns",) * n).reshape(-1, n)
             if times.ndim != 1 or len(rows) != len(times):
                 raise ArgumentError(f"raw: {len(rows)} samples, but {times.size} times")
             pointer = ffi.from_buffer("double[]", rows)
             for k, time in enumerate(times.tolist()):
                 check(lib.mhe_estimator_push_emg(self._pointer, time, pointer + k * n, self._error), self._error)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def tracked(self):
         """What the last estimate tracked, {channel: {...}} with copies of measured, target, weight, why and estimated
         (arrays, a number an entry), n_left_out, rms; {} where the last push gave no estimate. `why`: "used", "missing",
         "far", "saturated" or "unread"."""
-        self._enter()
+        self._turn.enter()
         try:
             found = {}
             if not self._has_estimate:
@@ -371,52 +190,52 @@ class Estimator:
             for i in range(e.n_tracked):
                 t = ffi.cast("mhe_tracked *", ffi.cast("char *", e.tracked) + i * e.tracked_size)
                 row = lib_channel(info, t.channel)
-                arrays = {name: _copy(getattr(t, name), row.width)
+                arrays = {name: copied(getattr(t, name), row.width)
                           for name in ("measured", "target", "weight", "estimated")}
                 why = [WHY[t.why[k]] for k in range(row.width)]
                 found[text(row.name)] = {**arrays, "why": why, "columns": names(row.columns, row.width),
                                          "n_measured": t.n_measured, "n_left_out": t.n_left_out, "rms": t.rms}
             return found
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     # ---- before the first frame ----
 
     def set_start(self, q=None, qdot=None):
         """The first state where the config leaves it open: q, qdot [n_coordinates] or {name: value}; NaN: not known."""
-        self._enter()
+        self._turn.enter()
         try:
             shape, labels = self._shapes["angles"]
-            addresses = [ffi.NULL if v is None else ffi.from_buffer("double[]", _doubles(name, v, shape, labels))
+            addresses = [ffi.NULL if v is None else ffi.from_buffer("double[]", doubles(name, v, shape, labels))
                          for name, v in (("q", q), ("qdot", qdot))]
             check(lib.mhe_estimator_set_start(self._pointer, *addresses, self._error), self._error)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def set_node(self, node):
         """Whose estimates are given: 0, the window's oldest frame, to `window`, the newest."""
-        self._enter()
+        self._turn.enter()
         try:
             check(lib.mhe_estimator_set_node(self._pointer, node, self._error), self._error)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     def set_deadline(self, seconds):
         """Time from a frame to its estimate after which a solve ends with what it has, s; 0: no limit."""
-        self._enter()
+        self._turn.enter()
         try:
             check(lib.mhe_estimator_set_deadline(self._pointer, seconds, self._error), self._error)
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     # ---- what it is ----
 
     def _get(self, read):
-        self._enter()
+        self._turn.enter()
         try:
             return read(self._describe())
         finally:
-            self._lock.release()
+            self._turn.leave()
 
     @property
     def coordinate_names(self):
@@ -488,17 +307,22 @@ class Estimator:
     def stop(self):
         """Ends the push that is at work in another thread, and every later one: they raise Interrupted. From any
         thread."""
-        pointer = self._pointer
-        if pointer != ffi.NULL:
-            lib.mhe_estimator_stop(pointer, 1)
+        with self._end:  # it may be closed meanwhile
+            if self._pointer != ffi.NULL:
+                lib.mhe_estimator_stop(self._pointer, 1)
 
     def close(self):
-        """Gives back its memory; waits for a push of another thread. Twice is fine."""
-        with self._lock:
-            pointer, self._pointer = self._pointer, ffi.NULL
+        """Gives back its memory; waits for a push that is at work in another thread, and refuses the next. Twice is
+        fine."""
+        self._turn.last()
+        try:
+            with self._end:
+                pointer, self._pointer = self._pointer, ffi.NULL
             lib.mhe_estimator_close(pointer)
             if pointer != ffi.NULL and self._owns_config:
                 self._config.close()
+        finally:
+            self._turn.leave()
 
     @property
     def closed(self):
@@ -533,7 +357,3 @@ def _channels(info):
     rows = [lib_channel(info, i) for i in range(info.n_channels)]
     return {text(row.name): {"columns": names(row.columns, row.width), "units": names(row.units, row.width),
                              "signal": text(row.signal), "delay": row.delay, "gap": row.gap} for row in rows}
-
-
-def _copy(pointer, n):
-    return np.frombuffer(ffi.buffer(pointer, 8 * n)).copy() if n > 0 else np.empty(0)

@@ -7,7 +7,8 @@ import numpy as np
 from ._config import Config
 from ._library import check, ffi, lib, new_error, taken_text, text
 from .errors import InputError
-from .estimator import UNITS, Estimator
+from .estimate import UNITS
+from .estimator import Estimator
 from .tables import Table
 
 VERDICT = ("yes", "doubtful", "no")

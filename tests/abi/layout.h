@@ -576,7 +576,7 @@ AT(mhe_acceleration, zdot_c, 96);
 AT(mhe_acceleration, zdot_z, 104);
 AT(mhe_acceleration, zdot_p, 112);
 
-SIZE(mhe_system, 104);
+SIZE(mhe_system, 112);
 AT(mhe_system, size, 0);
 AT(mhe_system, layout, 8);
 AT(mhe_system, n_x, 16);
@@ -590,11 +590,13 @@ AT(mhe_system, n_d, 44);
 AT(mhe_system, n_z, 48);
 AT(mhe_system, n_r, 52);
 AT(mhe_system, n_k, 56);
-AT(mhe_system, z_muscle, 64);
-AT(mhe_system, z_of, 72);
-AT(mhe_system, data, 80);
-AT(mhe_system, acceleration, 88);
-AT(mhe_system, activation_rate, 96);
+AT(mhe_system, first_d, 60);
+AT(mhe_system, first_z, 64);
+AT(mhe_system, z_muscle, 72);
+AT(mhe_system, z_of, 80);
+AT(mhe_system, data, 88);
+AT(mhe_system, acceleration, 96);
+AT(mhe_system, activation_rate, 104);
 
 SIZE(mhe_step_derivatives, 32);
 AT(mhe_step_derivatives, size, 0);

@@ -47,13 +47,13 @@ grep -q 'look exchanged' exchanged/report.html || fail "report.html does not tel
 # Ctrl-C: the files are complete as far as they go, and the message says how far.
 timeout 100 "$bin/mhe-run" "$demo" --out cut --quiet --set horizon.ratio=1 --set horizon.window=22 > /dev/null 2> cut.txt &
 pid=$!
-sleep 1
+until ls cut/.*.tmp > /dev/null 2>&1 || ! kill -0 $pid 2> /dev/null; do sleep 0.1; done
 kill -INT $pid
 wait $pid
 status=$?
 if [ $status -eq 1 ]; then
     grep -q interrupted cut.txt || fail "Ctrl-C: $(cat cut.txt)"
-    [ ! -d cut ] || find cut -name '.*' -type f | grep . && fail "Ctrl-C leaves temporary files"
+    [ -z "$(find . -path './cut/.*' -type f)" ] || fail "Ctrl-C leaves temporary files"
 elif [ $status -ne 0 ]; then
     fail "Ctrl-C: exit status $status"
 fi

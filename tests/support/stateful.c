@@ -153,7 +153,8 @@ void test_stateful_system(int32_t flags, mhe_system *out) {
     out->n_k = inside ? 3 : 2;
     out->z_muscle = inside ? inside_muscle : outside_muscle;
     out->z_of = inside ? inside_of : outside_of;
-    out->n_x = 2 * Q + out->n_d + out->n_z;
+    out->first_z = out->first_d + out->n_d;
+    out->n_x = out->first_z + out->n_z;
 }
 
 void test_stateful_state(const mhe_system *system, uint64_t *seed, double *x, double *u) {

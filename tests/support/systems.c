@@ -15,7 +15,9 @@ static void shape(int32_t flags, mhe_system *out) {
     out->n_r = flags & SYSTEM_RESIDUALS ? Q : 0;
     out->n_a = M;
     out->n_d = flags & SYSTEM_EXCITATION ? M : 0;
-    out->n_x = 2 * Q + out->n_d;
+    out->first_d = 2 * Q;
+    out->first_z = 2 * Q + out->n_d;
+    out->n_x = out->first_z;
     out->n_u = M + out->n_r;
 }
 

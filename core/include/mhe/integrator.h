@@ -70,11 +70,12 @@ struct mhe_system {
     int32_t n_a; /* n_m, or 0 where activations are among z */
     int32_t n_d; /* n_m, or 0: activation-driven, or activations are among z */
     int32_t n_z;
-    int32_t n_r;             /* controls that follow the muscles' */
-    int32_t n_k;             /* most entries of z that one muscle has */
-    const int32_t *z_muscle; /* [n_z] whose entry it is */
-    const int32_t *z_of;     /* [n_m x n_k] places in z of a muscle's entries, then -1 */
-    void *data;              /* the core's own */
+    int32_t n_r;              /* controls that follow the muscles' */
+    int32_t n_k;              /* most entries of z that one muscle has */
+    int32_t first_d, first_z; /* where d and z begin in x; q and v fill what is before d */
+    const int32_t *z_muscle;  /* [n_z] whose entry it is */
+    const int32_t *z_of;      /* [n_m x n_k] places in z of a muscle's entries, then -1 */
+    void *data;               /* the core's own */
     /* Accelerations and rates of z. `context` is the thread's own system context, which also holds
      * the values of parameters. MHE_RETRY where the state is out of the domain. [hot] */
     mhe_status (*acceleration)(const mhe_system *system, void *context, const mhe_system_point *at,

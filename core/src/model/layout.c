@@ -190,6 +190,8 @@ static int states(maker *m) {
             return 0;
         }
     }
+    s->face.first_d = 2 * s->face.n_q;
+    s->face.first_z = s->face.first_d + s->face.n_d;
     return 1;
 }
 

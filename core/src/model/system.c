@@ -399,7 +399,7 @@ const double *mhi_system_activation(const mhi_system *s, const double *x, const 
 void mhi_system_point(const mhi_system *s, const double *x, const double *u, const double *w,
                       mhe_system_point *point) {
     const mhe_system *f = &s->face;
-    const double *d = x + 2 * f->n_q;
+    const double *d = x + f->first_d;
     *point = (mhe_system_point){.size = sizeof *point,
                                 .q = x,
                                 .v = x + f->n_q,

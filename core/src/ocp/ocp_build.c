@@ -28,9 +28,9 @@ static void dynamics_pattern(const mhe_system *f, int32_t n_x, uint8_t *A, uint8
 /* Activation-driven with rigid tendons, all controls act on the skeleton alone: however many
  * muscles there are, B has no more than its states' rows. */
 static void tell_low_rank(mhi_ocp *ocp, const mhe_system *f) {
-    ocp->low_rank = (mhe_low_rank){.size = sizeof ocp->low_rank, .n_directions = 2 * f->n_q};
+    ocp->low_rank = (mhe_low_rank){.size = sizeof ocp->low_rank, .n_directions = f->first_d};
     const int32_t holds = f->n_d == 0 && f->n_z == 0 && ocp->signals.n_carried == 0;
-    ocp->face.low_rank = holds && f->n_u > 2 * f->n_q ? &ocp->low_rank : NULL;
+    ocp->face.low_rank = holds && f->n_u > f->first_d ? &ocp->low_rank : NULL;
 }
 
 /* What is carried moves with all that its signal depends on. */

@@ -35,7 +35,7 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
             [MHI_SIGNAL_LOOP_GAP] = {"loop_gap", "m", n_c, 0, 0, n_q, 0, 0, 1},
             [MHI_SIGNAL_ACTUATOR] = {"actuator", "1", n_act, 0,
                                      f->n_x + (n_act > 0 ? drive->first : 0), 0, 1, 0, 1},
-            [MHI_SIGNAL_LOOP_RATE] = {"loop_rate", "m/s", n_c, 0, 0, 2 * n_q, 0, 0, 1},
+            [MHI_SIGNAL_LOOP_RATE] = {"loop_rate", "m/s", n_c, 0, 0, f->first_d, 0, 0, 1},
         }};
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         mhi_signal *s = &signals->signal[i];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Covariances against the inverse of the whole optimality system, written down densely here. */
 #include "dense_covariance.h"
-#include "rig.h"
+#include "solver_rig.h"
 #include "support.h"
 
 #include <math.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Deadlines that pass anywhere in a solve. The clock is this program's: every look at it is a
  * microsecond, so a deadline of n microseconds passes at the n-th look, on any machine. */
-#include "rig.h"
+#include "solver_rig.h"
 #include "support.h"
 
 #include <math.h>

@@ -2,7 +2,7 @@
 /* What solver_rti does where a solve cannot go well, what its presets promise, and that a solve
  * takes no memory. Toys and rig are those of solver_ipopt. */
 #include "allocations.h"
-#include "rig.h"
+#include "solver_rig.h"
 #include "support.h"
 
 #include <malloc.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Windows in a row as an estimator has them: prepared or not, by one thread or by several, the
  * result has the same bits. */
-#include "rig.h"
+#include "solver_rig.h"
 #include "support.h"
 
 #include <math.h>

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* adapt_curvature: where the dynamics are so curved that Gauss-Newton steps overshoot or creep. */
-#include "rig.h"
+#include "solver_rig.h"
 #include "support.h"
 
 #include <math.h>

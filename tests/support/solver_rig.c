@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "rig.h"
+#include "solver_rig.h"
 #include "use.h"
 
 #include <math.h>

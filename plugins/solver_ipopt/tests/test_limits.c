@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What solver_ipopt does where a solve cannot go well: bounds, evaluations, options, time. */
-#include "rig.h"
+#include "solver_rig.h"
 #include "support.h"
 
 #include <math.h>

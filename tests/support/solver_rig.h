@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* rig.h: a solver plugin, loaded as a run loads it, on a toy. */
-#ifndef RIG_H
-#define RIG_H
+/* solver_rig.h: a solver plugin, loaded as a run loads it, on a toy. */
+#ifndef SOLVER_RIG_H
+#define SOLVER_RIG_H
 
 #include "toy.h"
 
