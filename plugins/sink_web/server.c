@@ -9,7 +9,7 @@
 #include <sys/random.h>
 #include <time.h>
 
-#define STATE_ROOM 16384 /* bytes of the run's state */
+#define STATE_ROOM 65536 /* bytes of the run's state */
 
 double web_now(void) {
     struct timespec t;

@@ -270,6 +270,8 @@ mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err) {
     s->err = err;
     s->prepared = 0;
     s->failure = MHE_OK;
+    s->control = NULL; /* ahead of a solve there is no limit of one */
+    s->deadline = INFINITY;
     if (is_finite(s->here.w, size_z(&s->shape))) {
         s->prepared = rti_evaluate(s, &s->here, RTI_DYNAMICS | RTI_DERIVATIVES);
     }
@@ -304,6 +306,7 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
     s->control = control;
     s->deadline = control != NULL && control->deadline > 0 ? control->deadline : INFINITY;
     if (rti_is_late(s, 0)) { /* at once */
+        s->control = NULL;
         info->outcome = MHE_SOLVE_DEADLINE;
         info->primal_residual = s->prepared ? largest_gap(s) : INFINITY;
         return MHE_OK;

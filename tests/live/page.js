@@ -110,7 +110,7 @@ async function strangers() {
   }
 }
 
-const phase = what => console.error("page.js: " + what);
+const begun = Date.now(), phase = what => console.error(`page.js: ${what}, ${((Date.now() - begun) / 1000).toFixed(1)} s`);
 setTimeout(() => fail("not done in 150 s"), 150000);
 (async () => {
   const deaf = net.connect(port, "127.0.0.1"); // a client that never reads

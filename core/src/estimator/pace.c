@@ -134,7 +134,7 @@ void mhi_pace_prepared(mhe_estimator *e, double seconds) {
 }
 
 void mhi_pace_tick(mhe_estimator *e) {
-    if (mhi_pace_by_clock(e)) {
+    if (mhi_ocp_work(e->ocp)->look != NULL) {
         (void)look(e);
     }
 }
@@ -142,6 +142,9 @@ void mhi_pace_tick(mhe_estimator *e) {
 void mhi_pace_solved(mhe_estimator *e) {
     mhi_work *work = mhi_ocp_work(e->ocp);
     e->pace.over = mhi_pace_over(e);
+    if (mhi_work_is_refused(work)) { /* some intervals had been done by then, who knows which */
+        mhi_ocp_forget(e->ocp);
+    }
     work->deadline = 0;
     work->look = NULL;
     atomic_store_explicit(&work->refused, 0, memory_order_relaxed);

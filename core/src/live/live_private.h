@@ -12,7 +12,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-#define MHI_LIVE_STATE 12288 /* bytes */
+#define MHI_LIVE_STATE 61440 /* bytes */
 #define MHI_LIVE_REQUESTS 16
 #define MHI_LIVE_MVC 64    /* electrodes whose maximum can be looked for */
 #define MHI_LIVE_EDITS 256 /* labels that can be given other names */

@@ -15,8 +15,6 @@ static void add_names(cJSON *list, char **names) {
 
 static void add_streams(const mhe_live *l, cJSON *root) {
     cJSON *streams = cJSON_AddArrayToObject(root, "streams");
-    cJSON *missing = cJSON_AddArrayToObject(root, "missing");
-    cJSON *unused = cJSON_AddArrayToObject(root, "unused");
     for (int32_t i = 0; i < l->feed.n_inlets; i++) {
         const mhi_inlet *in = &l->feed.inlets[i];
         cJSON *s = cJSON_CreateObject();
@@ -32,8 +30,10 @@ static void add_streams(const mhe_live *l, cJSON *root) {
                                 in->channel < 0 ? "not used"
                                 : in->lost      ? "lost"
                                                 : "running");
-        add_names(missing, in->missing);
-        add_names(unused, in->unused);
+        if (in->channel >= 0) {
+            add_names(cJSON_AddArrayToObject(s, "missing"), in->missing);
+            add_names(cJSON_AddArrayToObject(s, "unused"), in->unused);
+        }
     }
 }
 

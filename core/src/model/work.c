@@ -47,7 +47,7 @@ int32_t mhi_work_is_refused(const mhi_work *w) {
     return atomic_load_explicit(&w->refused, memory_order_relaxed);
 }
 
-int32_t mhi_work_take(mhi_work *w, int64_t units, int64_t *loan) {
+int32_t mhi_work_count(mhi_work *w, int64_t units, int64_t *loan) {
     if (*loan < units) {
         if (is_empty(w)) {
             return 0;
@@ -56,10 +56,14 @@ int32_t mhi_work_take(mhi_work *w, int64_t units, int64_t *loan) {
         *loan += MHI_WORK_LOAN;
     }
     *loan -= units;
+    return 1;
+}
+
+int32_t mhi_work_take(mhi_work *w, int64_t units, int64_t *loan) {
     if (is_late(w)) {
         mhi_work_refuse(w);
     }
-    return !mhi_work_is_refused(w);
+    return !mhi_work_is_refused(w) && mhi_work_count(w, units, loan);
 }
 
 void mhi_work_return(mhi_work *w, int64_t *loan) {

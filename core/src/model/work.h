@@ -39,6 +39,8 @@ void mhi_work_refuse(mhi_work *work); /* nothing more is given until the next be
 int32_t mhi_work_is_refused(const mhi_work *work);
 /* Takes from the account, `*loan` first. 0: there is no more. */
 int32_t mhi_work_take(mhi_work *work, int64_t units, int64_t *loan);
+/* The same whatever the clock says. */
+int32_t mhi_work_count(mhi_work *work, int64_t units, int64_t *loan);
 void mhi_work_return(mhi_work *work, int64_t *loan);
 
 #endif
