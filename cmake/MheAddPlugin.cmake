@@ -16,6 +16,7 @@ function(mhe_add_plugin name)
         PREFIX "" C_VISIBILITY_PRESET hidden CXX_VISIBILITY_PRESET hidden
         VISIBILITY_INLINES_HIDDEN ON POSITION_INDEPENDENT_CODE ON)
     target_compile_features(${target} PRIVATE c_std_11)
+    target_compile_options(${target} PRIVATE $<$<CONFIG:>:-O2>) # no build type was chosen: a plugin is never meant to be slow
     if(TARGET mhe_flags)
         target_link_libraries(${target} PRIVATE mhe_flags)
         set_target_properties(${target} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${MHE_PLUGIN_BUILD_DIR})

@@ -40,9 +40,18 @@ static const words_command commands[] = {
      .help = "positions, lengths, moment arms, mass matrix, inverse dynamics, muscle forces and "
              "joint reactions at the poses of FILE.json (its form: mhe/inspect.h), as JSON",
      .most = 1,
-     .missing = "which model? mhe-model --help"}};
+     .missing = "which model? mhe-model --help"},
+    {.name = "scale",
+     .operand = "SETUP.xml",
+     .what = "setup file",
+     .help = "the model of a person out of a generic one, as a Scale setup of OpenSim says: bodies "
+             "by marker distances of a static trial, muscles by their paths, then the markers' "
+             "places",
+     .most = 1,
+     .missing = "which setup? mhe-model --help"}};
 #define INFO 1u
 #define EVALUATE 2u
+#define SCALE 4u
 #define AT(field) offsetof(arguments, field)
 
 static const words_option options[] = {{.name = "--json",
@@ -58,9 +67,10 @@ static const words_option options[] = {{.name = "--json",
                                         .kind = WORDS_TEXT,
                                         .at = AT(poses)},
                                        {.name = "--out",
-                                        .value = "FILE.json",
-                                        .help = "the answer; stdout unless given",
-                                        .commands = EVALUATE,
+                                        .value = "FILE",
+                                        .help = "the answer, .json, stdout unless given; the "
+                                                "scaled model, .osim",
+                                        .commands = EVALUATE | SCALE,
                                         .kind = WORDS_TEXT,
                                         .at = AT(out)},
                                        {.name = "--paths",
@@ -77,10 +87,11 @@ static const words_program program = {
     .usage = "  mhe-model info MODEL [--json]\n"
              "  mhe-model evaluate MODEL --poses FILE.json [--out FILE.json] [--paths "
              "exact|fitted]\n"
+             "  mhe-model scale SETUP.xml --out MODEL.osim\n"
              "  mhe-model --version | --help\n",
     .notes = "Exit status: 0 done; 2 the command line or a file is wrong; 1 anything else.\n",
     .commands = commands,
-    .n_commands = 2,
+    .n_commands = 3,
     .options = options,
     .n_options = sizeof options / sizeof options[0],
     .mode = AT(mode),
@@ -144,6 +155,10 @@ static mhe_status answer_to(const mhe_host *host, int32_t command, const argumen
         return mhe_model_info(host, w->model, w->json ? MHE_FORMAT_JSON : MHE_FORMAT_TEXT, answer,
                               err);
     }
+    if (command == 2) {
+        return w->out == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "where to? --out MODEL.osim")
+                              : mhe_model_scale(host, w->model, w->out, answer, err);
+    }
     if (w->poses == NULL) {
         return mhe_fail(err, MHE_E_ARGUMENT, "which poses? --poses FILE.json");
     }
@@ -162,7 +177,7 @@ int main(int argc, char **argv) {
     } else if (status == MHE_OK && outcome == WORDS_RUN) {
         status = answer_to(&host, command, &w, &answer, &err);
         if (status == MHE_OK) {
-            status = give(w.out, answer, &err);
+            status = give(command == 2 ? NULL : w.out, answer, &err);
         }
     }
     mhe_free(answer);

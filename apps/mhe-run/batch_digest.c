@@ -85,20 +85,36 @@ static int path_of(const batch *b, const batch_trial *t, const char *suffix, cha
     return n > 0 && n < 4200;
 }
 
+/* What follows "KEY " in the next line, without its end; NULL: another line stands there. */
+static char *field(FILE *file, const char *key, char *line, int size) {
+    const size_t n = strlen(key);
+    if (fgets(line, size, file) == NULL || strncmp(line, key, n) != 0 || line[n] != ' ') {
+        return NULL;
+    }
+    line[strcspn(line, "\n")] = '\0';
+    return line + n + 1;
+}
+
 int32_t batch_end_read(const batch *b, const batch_trial *t, batch_end *end) {
-    char path[4200];
+    char path[4200], digest[64], status[64], seconds[64], message[sizeof end->message + 16];
     FILE *file = path_of(b, t, "", path) ? fopen(path, "r") : NULL;
     *end = (batch_end){.digest = 0};
     if (file == NULL) {
         return 0;
     }
-    const int n = fscanf(file, "digest %16" SCNx64 "\nstatus %" SCNd32 "\nseconds %lf\nmessage ",
-                         &end->digest, &end->status, &end->seconds);
-    if (n == 3 && fgets(end->message, sizeof end->message, file) != NULL) {
-        end->message[strcspn(end->message, "\n")] = '\0';
-    }
+    const char *const of[] = {field(file, "digest", digest, sizeof digest),
+                              field(file, "status", status, sizeof status),
+                              field(file, "seconds", seconds, sizeof seconds),
+                              field(file, "message", message, sizeof message)};
     (void)fclose(file);
-    return n == 3;
+    if (of[0] == NULL || of[1] == NULL || of[2] == NULL) {
+        return 0;
+    }
+    end->digest = strtoull(of[0], NULL, 16);
+    end->status = (int32_t)strtol(of[1], NULL, 10);
+    end->seconds = strtod(of[2], NULL);
+    (void)snprintf(end->message, sizeof end->message, "%s", of[3] == NULL ? "" : of[3]);
+    return 1;
 }
 
 mhe_status batch_end_write(const batch *b, const batch_trial *t, const batch_end *end,

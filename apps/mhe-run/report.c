@@ -47,12 +47,48 @@ static void add_line(mhi_text *out, const rows *t, int32_t column, double scale,
     mhi_text_add(out, "\"/>");
 }
 
+#define NOMINAL_95 1.96 /* standard deviations on both sides */
+
+/* The band of a column about the estimate, in both directions one line; rows are those of the
+ * estimates. */
+static void add_band(mhi_text *out, const rows *t, int32_t column, const rows *sd,
+                     int32_t sd_column, double scale, const double range[2]) {
+    const int32_t step = t->is.n_rows / POINTS + 1, n = (t->is.n_rows - 1) / step + 1;
+    const double begin = t->is.time[0], span = t->is.time[t->is.n_rows - 1] - begin;
+    int open = 0;
+    mhi_text_add(out, "<path class=\"band\" d=\"");
+    for (int32_t i = 0; i < 2 * n; i++) {
+        const int32_t k = step * (i < n ? i : 2 * n - 1 - i);
+        const double half = NOMINAL_95 * value_at(sd, k, sd_column, scale);
+        const double y = value_at(t, k, column, scale) + (i < n ? half : -half);
+        if (isfinite(y)) {
+            mhi_text_add(out, "%c%.1f %.1f", open ? 'L' : 'M',
+                         span > 0 ? WIDTH * (t->is.time[k] - begin) / span : 0,
+                         HEIGHT * (range[1] - y) / (range[1] - range[0]));
+            open = 1;
+        }
+    }
+    mhi_text_add(out, "%s\"/>", open ? "Z" : "");
+}
+
+/* The range of a picture holds the band, too. */
+static void widen_by_band(const rows *t, int32_t column, const rows *sd, int32_t sd_column,
+                          double scale, double range[2]) {
+    for (int32_t k = 0; k < t->is.n_rows; k++) {
+        const double half = NOMINAL_95 * value_at(sd, k, sd_column, scale);
+        range[0] = fmin(range[0], value_at(t, k, column, scale) - half);
+        range[1] = fmax(range[1], value_at(t, k, column, scale) + half);
+    }
+}
+
 /* A row of pictures: what is drawn, against what; least: the axis spans at least that much. */
 typedef struct quantity {
     const char *heading, *prefix, *unit;
     const rows *table, *measured, *truth; /* of the last two NULL: none */
     const char *truth_prefix;
     double scale, least;
+    const rows *sd; /* NULL: none */
+    const char *sd_prefix;
 } quantity;
 
 /* One small picture: a column, what was measured of it and what is true, where these are known. */
@@ -63,8 +99,14 @@ static void add_panel(mhi_text *out, const quantity *q, const char *name, int32_
     char label[256];
     (void)snprintf(label, sizeof label, "%s%s", q->truth_prefix, name);
     const int32_t truth = q->truth == NULL ? -1 : mhe_table_find(q->truth->table, label);
+    (void)snprintf(label, sizeof label, "%s%s", q->sd_prefix, name);
+    int32_t sd = q->sd == NULL ? -1 : mhe_table_find(q->sd->table, label);
+    sd = sd >= 0 && q->sd->is.n_rows == t->is.n_rows ? sd : -1;
     double range[2] = {INFINITY, -INFINITY};
     widen(t, column, scale, range);
+    if (sd >= 0) {
+        widen_by_band(t, column, q->sd, sd, scale, range);
+    }
     widen(other, other_column, scale, range);
     widen(q->truth, truth, scale, range);
     if (!(range[0] <= range[1])) {
@@ -81,6 +123,9 @@ static void add_panel(mhi_text *out, const quantity *q, const char *name, int32_
         const int grounded = range[0] >= 0 && middle < 0.5 * q->least;
         range[0] = grounded ? 0 : middle - 0.5 * q->least;
         range[1] = range[0] + q->least;
+    }
+    if (sd >= 0) {
+        add_band(out, t, column, q->sd, sd, scale, range);
     }
     if (truth >= 0) {
         add_line(out, q->truth, truth, scale, range, t, "true");
@@ -115,6 +160,7 @@ static const char head[] =
     "figure{margin:0}figcaption{overflow-wrap:anywhere}small{color:#666}\n"
     "svg{width:100%;background:#f6f6f6}path{fill:none;stroke-width:1.5}\n"
     ".estimated{stroke:#1f5fa8}.measured{stroke:#d9822b}.true{stroke:#999;stroke-width:3}\n"
+    ".band{fill:#1f5fa8;fill-opacity:.18;stroke:none}\n"
     "pre{white-space:pre-wrap;overflow-wrap:anywhere}\n"
     "@media(max-width:600px){body{margin:1em auto}\n"
     "div{grid-template-columns:repeat(auto-fill,minmax(150px,1fr))}h1{font-size:1.4em}}\n"
@@ -132,29 +178,33 @@ static void compose(mhi_text *out, const char *name, const char *summary, const 
     add_escaped(out, name);
     mhi_text_add(out, "</h1>\n<pre>");
     add_escaped(out, summary);
-    mhi_text_add(out,
-                 "</pre>\n<p>Blue: estimated. Orange: measured.%s Time from %.4g to %.4g s. Least "
-                 "and largest value stand above each picture.</p>\n",
-                 tables[5].table != NULL ? " Grey: the known truth." : "", tables[0].is.time[0],
-                 tables[0].is.time[tables[0].is.n_rows - 1]);
+    mhi_text_add(
+        out,
+        "</pre>\n<p>Blue: estimated%s. Orange: measured.%s Time from %.4g to %.4g s. Least "
+        "and largest value stand above each picture.</p>\n",
+        tables[6].table != NULL ? ", with its nominal 95 % band" : "",
+        tables[5].table != NULL ? " Grey: the known truth." : "", tables[0].is.time[0],
+        tables[0].is.time[tables[0].is.n_rows - 1]);
     const rows *truth = shown(&tables[5]), *states = shown(&tables[0]);
+    const rows *sd = shown(&tables[6]);
     const quantity all[] = {
         {"Joint coordinates (of sliders 1/57.3 m)", "q_", "deg", states, NULL, truth, "q_",
-         MHI_DEGREES, 1},
-        {"Activation against EMG", "a_", "of 1", states, shown(&tables[3]), truth, "a_", 1, 0.1},
-        {"Muscle forces", "", "N", shown(&tables[1]), NULL, truth, "F_", 1, 10},
-        {"Distance of markers", "", "mm", shown(&tables[2]), NULL, NULL, "", 1e3, 1},
-        {"Solve time", "solve_", "ms", shown(&tables[4]), NULL, NULL, "", 1, 1}};
+         MHI_DEGREES, 1, sd, "q_"},
+        {"Activation against EMG", "a_", "of 1", states, shown(&tables[3]), truth, "a_", 1, 0.1, sd,
+         "a_"},
+        {"Muscle forces", "", "N", shown(&tables[1]), NULL, truth, "F_", 1, 10, sd, "force_"},
+        {"Distance of markers", "", "mm", shown(&tables[2]), NULL, NULL, "", 1e3, 1, NULL, ""},
+        {"Solve time", "solve_", "ms", shown(&tables[4]), NULL, NULL, "", 1, 1, NULL, ""}};
     for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
         add_all(out, &all[i]);
     }
 }
 
 mhe_status report_write(const char *dir, const char *name, const char *summary,
-                        const char *reference, mhe_error *err) {
+                        const char *reference, int with_bands, mhe_error *err) {
     static const char *const files[] = {"estimates.sto", "forces.sto", "marker_residuals.sto",
                                         "emg.sto", "quality.sto"};
-    rows tables[6] = {{0}}; /* the last: the known truth */
+    rows tables[7] = {{0}}; /* the last: the known truth, standard deviations */
     mhi_text page = {0};
     mhe_outbox *outbox = NULL;
     mhe_status status = rows_read_in(dir, files[0], &tables[0], err);
@@ -164,6 +214,9 @@ mhe_status report_write(const char *dir, const char *name, const char *summary,
     }
     if (status == MHE_OK && reference != NULL) {
         (void)rows_read(reference, &tables[5], NULL);
+    }
+    if (status == MHE_OK && with_bands) {
+        (void)rows_read_in(dir, "uncertainty.sto", &tables[6], NULL);
     }
     if (status == MHE_OK) {
         compose(&page, name, summary, tables);
@@ -178,7 +231,7 @@ mhe_status report_write(const char *dir, const char *name, const char *summary,
     }
     mhe_outbox_close(outbox);
     mhi_text_free(&page);
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < 7; i++) {
         rows_close(&tables[i]);
     }
     return status;

@@ -7,8 +7,9 @@
 
 /* Writes dir/report.html from the result files in dir (complete): `summary` (plain lines) and
  * pictures of joint angles, EMG against activation, forces, markers and solve times, beside the
- * truth in `reference` (a .sto with columns q_*, a_*, F_*; NULL: not known). [cold] */
+ * truth in `reference` (a .sto with columns q_*, a_*, F_*; NULL: not known), and bands where
+ * `with_bands`. [cold] */
 mhe_status report_write(const char *dir, const char *name, const char *summary,
-                        const char *reference, mhe_error *err);
+                        const char *reference, int with_bands, mhe_error *err);
 
 #endif

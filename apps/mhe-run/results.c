@@ -4,17 +4,18 @@
 #include "base/arena.h"
 #include "matlab.h"
 
+#include <math.h>
 #include <string.h>
 
 #define MOST_SINKS 2
 
 /* Also what picture.c, report.c and summary.c write. */
 const char *const results_names[] = {
-    "estimates.sto", "estimates.csv", "motion.sto",   "forces.sto",  "forces.csv",
-    "torques.sto",   "torques.csv",   "markers.trc",  "markers.csv", "marker_residuals.sto",
-    "emg.sto",       "emg.csv",       "quality.sto",  "quality.csv", "marker_residuals.csv",
-    "results.mat",   "config.yaml",   "summary.json", "report.html", "estimates.gp",
-    "estimates.svg", "reactions.sto", "reactions.csv"};
+    "estimates.sto", "estimates.csv", "motion.sto",    "forces.sto",      "forces.csv",
+    "torques.sto",   "torques.csv",   "markers.trc",   "markers.csv",     "marker_residuals.sto",
+    "emg.sto",       "emg.csv",       "quality.sto",   "quality.csv",     "marker_residuals.csv",
+    "results.mat",   "config.yaml",   "summary.json",  "report.html",     "estimates.gp",
+    "estimates.svg", "reactions.sto", "reactions.csv", "uncertainty.sto", "uncertainty.csv"};
 const int32_t results_n_names = (int32_t)(sizeof results_names / sizeof results_names[0]);
 
 /* One table in all its formats. */
@@ -26,7 +27,8 @@ typedef struct series {
 
 struct results {
     mhe_estimator_info info;
-    series estimates, motion, forces, markers, residuals, torques, emg, quality, reactions;
+    series estimates, motion, forces, markers, residuals, torques, emg, quality, reactions,
+        uncertainty;
     matlab *matlab;             /* NULL: no such file */
     const mhe_block *actuators; /* NULL: none are driven */
     int32_t csv;
@@ -151,6 +153,18 @@ static mhe_status open_reactions(results *r, mhe_outbox *outbox, names *labels, 
                        &r->reactions, err);
 }
 
+static mhe_status open_uncertainty(results *r, mhe_outbox *outbox, names *labels, mhe_error *err) {
+    const mhe_estimator_info *f = &r->info;
+    labels->n = 0;
+    add_names(labels, "q_", f->coordinate_names, f->n_q, "");
+    add_names(labels, "a_", f->muscle_names, f->n_muscles, "");
+    add_names(labels, "force_", f->muscle_names, f->n_muscles, "");
+    add_names(labels, "moment_", f->coordinate_names, f->n_q, "");
+    return open_series(r, outbox, "uncertainty",
+                       "standard deviations of angles, activations, forces (N), moments (N m)",
+                       labels, &r->uncertainty, err);
+}
+
 static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_info *recording,
                            const char **room, mhe_error *err) {
     static const char *quality[] = {"status",   "iterations", "kkt_residual",
@@ -190,6 +204,9 @@ static mhe_status open_all(results *r, mhe_outbox *outbox, const mhe_recording_i
     }
     if (status == MHE_OK && f->n_joints > 0) {
         status = open_reactions(r, outbox, &labels, err);
+    }
+    if (status == MHE_OK && f->uncertainty) {
+        status = open_uncertainty(r, outbox, &labels, err);
     }
     const names of_quality = {.owner = r, .list = quality, .n = 6};
     return status == MHE_OK ? open_series(r, outbox, "quality", "quality of each estimate",
@@ -252,6 +269,22 @@ static mhe_status write_row(const series *s, double time, const double *values, 
     return status == MHE_OK && s->table != NULL ? matlab_row(s->table, time, values, err) : status;
 }
 
+/* NaN where an estimate has none. */
+static mhe_status write_uncertainty(results *r, const mhe_estimate *e, mhe_error *err) {
+    const mhe_estimator_info *f = &r->info;
+    int32_t n = 2 * (f->n_q + f->n_muscles);
+    for (int32_t i = 0; i < n; i++) {
+        r->row[i] = NAN;
+    }
+    if (e->q_sd != NULL) {
+        n = put(r, 0, e->q_sd, f->n_q);
+        n = put(r, n, e->activation_sd, f->n_muscles);
+        n = put(r, n, e->force_sd, f->n_muscles);
+        (void)put(r, n, e->moment_sd, f->n_q);
+    }
+    return write_row(&r->uncertainty, e->time, r->row, err);
+}
+
 mhe_status results_write(results *r, const mhe_estimate *e, const double *distance,
                          const double *emg, mhe_error *err) {
     const mhe_estimator_info *f = &r->info;
@@ -294,6 +327,9 @@ mhe_status results_write(results *r, const mhe_estimate *e, const double *distan
     }
     if (status == MHE_OK && e->reactions != NULL) {
         status = write_row(&r->reactions, e->time, e->reactions, err);
+    }
+    if (status == MHE_OK && f->uncertainty) {
+        status = write_uncertainty(r, e, err);
     }
     if (status == MHE_OK) {
         const double quality[] = {e->status,           e->iterations, e->kkt_residual,

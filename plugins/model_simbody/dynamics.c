@@ -9,6 +9,8 @@
  *     S''_j = a_p x S_j + v_p x S'_j,
  * and its force I a + v x* I v changes by I_i S''_j + B_i S'_j with
  *     B_i x = v_i x* I_i x - I_i (v_i x x) + x x* I_i v_i     (rate).
+ * Written out with I = (m, h, J), v = [w, u] and x = [a, b], Jacobi's identity leaves nothing of b:
+ *     B x = [(2 w x J - tr(J) w x - 2 u h^T + 2 u.h) a, 2 a x p],     p = m u + w x h.
  * A change of the joint's speed gives dv_i = S_j, da_i = 2 S'_j - v_i x S_j, hence the force
  * changes by 2 I_i S'_j + B_i S_j. Sums over the links beyond a joint are the composites. */
 #include "dynamics.h"
@@ -20,7 +22,7 @@
 
 static const double no_motion[6];
 
-void inertia_times(const rigid_inertia *inertia, const double *v, double *f) {
+static inline void times(const rigid_inertia *inertia, const double *v, double *f) {
     double other[3];
     rotate3(inertia->second, v, f);
     cross3(inertia->first, v + 3, other);
@@ -31,6 +33,10 @@ void inertia_times(const rigid_inertia *inertia, const double *v, double *f) {
     for (int i = 0; i < 3; i++) {
         f[3 + i] = inertia->mass * v[3 + i] + other[i];
     }
+}
+
+void inertia_times(const rigid_inertia *inertia, const double *v, double *f) {
+    times(inertia, v, f);
 }
 
 static void inertia_add(rigid_inertia *to, const rigid_inertia *from) {
@@ -146,7 +152,7 @@ void dynamics_mass(const tree *t, const link_motion *links, double *mass) {
     memset(mass, 0, n * n * sizeof *mass);
     for (int32_t j = 0; j < t->n_joints; j++) {
         double momentum[6];
-        inertia_times(&links[j].composite, links[j].axis, momentum);
+        times(&links[j].composite, links[j].axis, momentum);
         for (int32_t i = j; i >= 0; i = t->joints[i].parent) {
             double entry = dot6(links[i].axis, momentum);
             mass[(size_t)i * n + (size_t)j] = entry;
@@ -187,9 +193,9 @@ void dynamics_inverse(const tree *t, const double *speed, const double *accelera
         memset(link->force, 0, sizeof link->force);
         if (link->own.mass > 0) {
             double momentum[6], turning[6];
-            inertia_times(&link->own, link->velocity, momentum);
+            times(&link->own, link->velocity, momentum);
             cross_force(link->velocity, momentum, turning);
-            inertia_times(&link->own, link->acceleration, link->force);
+            times(&link->own, link->acceleration, link->force);
             add6(link->force, 1, turning);
         }
     }
@@ -201,39 +207,45 @@ void dynamics_inverse(const tree *t, const double *speed, const double *accelera
     }
 }
 
-/* B of one link, row-major [6 x 6], column by column. */
-static void own_rate(const link_motion *link, double *rate) {
-    double momentum[6];
-    inertia_times(&link->own, link->velocity, momentum);
-    for (int k = 0; k < 6; k++) {
-        double x[6] = {0}, first[6], second[6], turned[6];
-        x[k] = 1;
-        inertia_times(&link->own, x, turned);
-        cross_force(link->velocity, turned, first);
-        cross_motion(link->velocity, x, turned);
-        inertia_times(&link->own, turned, second);
-        add6(first, -1, second);
-        cross_force(x, momentum, second);
-        for (int i = 0; i < 6; i++) {
-            rate[6 * i + k] = first[i] + second[i];
+/* B of one link: rate, and p. */
+static void own_rate(const link_motion *link, double *rate, double *momentum) {
+    const double *w = link->velocity, *u = w + 3, *h = link->own.first, *j = link->own.second;
+    const double along = 2 * dot3(u, h), trace = trace3(j);
+    cross3(w, h, momentum);
+    add3(momentum, link->own.mass, u);
+    for (int k = 0; k < 3; k++) {
+        const double column[3] = {j[k], j[3 + k], j[6 + k]};
+        double turned[3];
+        cross3(w, column, turned);
+        for (int i = 0; i < 3; i++) {
+            rate[3 * i + k] = 2 * (turned[i] - u[i] * h[k]);
         }
+        rate[4 * k] += along;
     }
+    rate[1] += trace * w[2];
+    rate[2] -= trace * w[1];
+    rate[3] -= trace * w[2];
+    rate[5] += trace * w[0];
+    rate[6] += trace * w[1];
+    rate[7] -= trace * w[0];
 }
 
 void dynamics_rates(const tree *t, link_motion *links) {
     for (int32_t i = 0; i < t->n_joints; i++) {
         if (links[i].own.mass > 0) {
-            own_rate(&links[i], links[i].rate);
+            own_rate(&links[i], links[i].rate, links[i].momentum);
         } else {
             memset(links[i].rate, 0, sizeof links[i].rate);
+            memset(links[i].momentum, 0, sizeof links[i].momentum);
         }
     }
     for (int32_t i = t->n_joints - 1; i >= 0; i--) {
         if (t->joints[i].parent >= 0) {
-            double *sum = links[t->joints[i].parent].rate;
-            for (int k = 0; k < 36; k++) {
-                sum[k] += links[i].rate[k];
+            link_motion *sum = &links[t->joints[i].parent];
+            for (int k = 0; k < 9; k++) {
+                sum->rate[k] += links[i].rate[k];
             }
+            add3(sum->momentum, 1, links[i].momentum);
         }
     }
 }
@@ -241,58 +253,64 @@ void dynamics_rates(const tree *t, link_motion *links) {
 /* out = I x + B y of the composite */
 static void composite_change(const link_motion *link, const double *x, const double *y,
                              double *out) {
-    inertia_times(&link->composite, x, out);
-    for (int i = 0; i < 6; i++) {
-        out[i] += dot6(link->rate + 6 * i, y);
-    }
+    double turned[3], moved[3];
+    times(&link->composite, x, out);
+    rotate3(link->rate, y, turned);
+    cross3(y, link->momentum, moved);
+    add3(out, 1, turned);
+    add3(out + 3, 2, moved);
 }
 
-/* out = B^T x of the composite */
+/* out [3]: the first half of B^T x of the composite; the other is 0. */
 static void composite_rate_transposed(const link_motion *link, const double *x, double *out) {
-    memset(out, 0, 6 * sizeof *out);
-    for (int i = 0; i < 6; i++) {
-        add6(out, x[i], link->rate + 6 * i);
+    double moved[3];
+    cross3(link->momentum, x + 3, moved);
+    for (int i = 0; i < 3; i++) {
+        out[i] = x[0] * link->rate[i] + x[1] * link->rate[3 + i] + x[2] * link->rate[6 + i] +
+                 2 * moved[i];
     }
 }
 
-/* S''_j */
-static void second_axis_rate(const tree *t, const link_motion *links, int32_t j, double *out) {
-    int32_t parent = t->joints[j].parent;
-    double base[6], turning[6];
-    base_acceleration(t, links, j, base);
-    cross_motion(base, links[j].axis, out);
-    cross_motion(parent < 0 ? no_motion : links[parent].velocity, links[j].axis_rate, turning);
-    add6(out, 1, turning);
+/* S'' of all joints */
+static void second_axis_rates(const tree *t, link_motion *links) {
+    for (int32_t j = 0; j < t->n_joints; j++) {
+        int32_t parent = t->joints[j].parent;
+        double base[6], turning[6];
+        base_acceleration(t, links, j, base);
+        cross_motion(base, links[j].axis, links[j].second);
+        cross_motion(parent < 0 ? no_motion : links[parent].velocity, links[j].axis_rate, turning);
+        add6(links[j].second, 1, turning);
+    }
 }
 
-void dynamics_derivatives(const tree *t, const link_motion *links, double *by_angle,
-                          double *by_speed) {
+void dynamics_derivatives(const tree *t, link_motion *links, double *by_angle, double *by_speed) {
     size_t n = (size_t)t->n_joints;
     memset(by_angle, 0, n * n * sizeof *by_angle);
     memset(by_speed, 0, n * n * sizeof *by_speed);
+    second_axis_rates(t, links);
     for (int32_t j = 0; j < t->n_joints; j++) {
         const link_motion *link = &links[j];
-        double second[6], twice[6] = {0}, angle[6], speed[6], carried[6], inertia[6], rate[6];
-        second_axis_rate(t, links, j, second);
-        add6(twice, 2, link->axis_rate);
+        double twice[6], angle[6], speed[6], carried[6], inertia[6], rate[3];
+        for (int k = 0; k < 6; k++) {
+            twice[k] = 2 * link->axis_rate[k];
+        }
         /* column j, rows of j and of the joints that carry it */
-        composite_change(link, second, link->axis_rate, angle);
+        composite_change(link, link->second, link->axis_rate, angle);
         composite_change(link, twice, link->axis, speed);
         by_angle[(size_t)j * n + (size_t)j] = dot6(link->axis, angle);
         by_speed[(size_t)j * n + (size_t)j] = dot6(link->axis, speed);
         cross_force(link->axis, link->force, carried);
         add6(angle, 1, carried); /* seen from ground, the force itself is moved along */
         /* row j, columns of the joints that carry it */
-        inertia_times(&link->composite, link->axis, inertia);
+        times(&link->composite, link->axis, inertia);
         composite_rate_transposed(link, link->axis, rate);
         for (int32_t i = t->joints[j].parent; i >= 0; i = t->joints[i].parent) {
             const link_motion *base = &links[i];
             size_t above = (size_t)i * n + (size_t)j, below = (size_t)j * n + (size_t)i;
             by_angle[above] = dot6(base->axis, angle);
             by_speed[above] = dot6(base->axis, speed);
-            second_axis_rate(t, links, i, second);
-            by_angle[below] = dot6(inertia, second) + dot6(rate, base->axis_rate);
-            by_speed[below] = 2 * dot6(inertia, base->axis_rate) + dot6(rate, base->axis);
+            by_angle[below] = dot6(inertia, base->second) + dot3(rate, base->axis_rate);
+            by_speed[below] = 2 * dot6(inertia, base->axis_rate) + dot3(rate, base->axis);
         }
     }
 }

@@ -33,7 +33,8 @@ typedef struct link_motion {
     double acceleration[6]; /* a, with gravity as an upward acceleration of ground */
     double force[6];        /* composite: rate of momentum */
     rigid_inertia own, composite;
-    double rate[36]; /* composite: change of force with velocity, see dynamics_rates() */
+    double second[6];            /* S'' of dynamics.c, of the last dynamics_derivatives() */
+    double rate[9], momentum[3]; /* composite: change of force with velocity, dynamics_rates() */
 } link_motion;
 
 /* The links' placement in ground, r [n_joints x 9], p [n_joints x 3], at the joints' `angle` (rad
@@ -63,7 +64,6 @@ void dynamics_rates(const tree *tree, link_motion *links);
 
 /* Derivatives of the torques of the last dynamics_inverse(): by_angle and by_speed [n_joints x
  * n_joints], row: torque. */
-void dynamics_derivatives(const tree *tree, const link_motion *links, double *by_angle,
-                          double *by_speed);
+void dynamics_derivatives(const tree *tree, link_motion *links, double *by_angle, double *by_speed);
 
 #endif

@@ -7,19 +7,44 @@
 #include "context.h"
 #include "numbers.h"
 
+#include "../clones.h"
+
 #include <math.h>
 #include <string.h>
 
-static int all_finite(const double *values, size_t n) {
-    double sum = 0;
-    for (size_t i = 0; i < n; i++) {
-        sum += values[i] * 0.0;
+/* Four doubles, wherever they lie. */
+typedef double lanes __attribute__((vector_size(32), aligned(8), may_alias));
+
+/* In sums that do not wait for each other. */
+static inline __attribute__((always_inline)) int finite(const double *values, size_t n) {
+    lanes sum[2] = {{0}};
+    double rest = 0;
+    size_t i = 0;
+    for (; i + 8 <= n; i += 8) {
+        sum[0] += *(const lanes *)(values + i) * 0.0;
+        sum[1] += *(const lanes *)(values + i + 4) * 0.0;
     }
-    return sum == 0;
+    for (; i < n; i++) {
+        rest += values[i] * 0.0;
+    }
+    sum[0] += sum[1];
+    return (sum[0][0] + sum[0][1]) + (sum[0][2] + sum[0][3]) + rest == 0;
+}
+
+static int all_finite(const double *values, size_t n) {
+    return finite(values, n);
+}
+
+CLONES static int many_finite(const double *values, size_t n) {
+    return finite(values, n);
 }
 
 /* out [n_q] = J^T torque */
 static void to_coordinates(const simbody_context *c, const double *torque, double *out) {
+    if (c->tree->direct) {
+        memcpy(out, torque, sizeof *out * (size_t)c->tree->n_q);
+        return;
+    }
     memset(out, 0, sizeof *out * (size_t)c->tree->n_q);
     for (int32_t i = 0; i < c->tree->n_joints; i++) {
         out[c->tree->joints[i].coordinate] += c->slopes[4 * i + 1] * torque[i];
@@ -35,7 +60,14 @@ static mhe_status context_place(simbody_context *c, const double *q, const doubl
     for (int32_t i = 0; i < t->n_joints; i++) {
         const tree_joint *joint = &t->joints[i];
         double *f = c->slopes + 4 * i;
-        function_compose(joint->function, c->numbers + 4 * joint->number, f);
+        if (joint->affine) {
+            const double *coef = joint->function->coef;
+            f[0] = coef[1] * (q[joint->number] - joint->function->origin[0]) + coef[0];
+            f[1] = coef[1];
+            f[2] = f[3] = 0;
+        } else {
+            function_compose(joint->function, c->numbers + 4 * joint->number, f);
+        }
         c->angle[i] = f[0];
         c->speed[i] = f[1] * v[joint->coordinate];
     }
@@ -61,14 +93,19 @@ static mhe_status context_mass(simbody_context *c, mhe_error *err) {
     if (c->has_mass) {
         return MHE_OK;
     }
+    double *joint_mass = t->direct ? c->mass : c->joint_mass;
     dynamics_inertias(t, c->r, c->p, c->links, c->points);
     if (c->dynamics == SIMBODY_DYNAMICS_SIMBODY) {
-        mhe_status status = skeleton_dynamics(c->skeleton, NULL, NULL, NULL, c->joint_mass, err);
+        mhe_status status = skeleton_dynamics(c->skeleton, NULL, NULL, NULL, joint_mass, err);
         if (status != MHE_OK) {
             return status;
         }
     } else {
-        dynamics_mass(t, c->links, c->joint_mass);
+        dynamics_mass(t, c->links, joint_mass);
+    }
+    c->has_mass = 1;
+    if (t->direct) {
+        return MHE_OK;
     }
     memset(c->mass, 0, n_q * n_q * sizeof *c->mass);
     for (size_t i = 0; i < n; i++) {
@@ -79,7 +116,6 @@ static mhe_status context_mass(simbody_context *c, mhe_error *err) {
                 c->slopes[4 * i + 1] * c->joint_mass[i * n + j] * c->slopes[4 * j + 1];
         }
     }
-    c->has_mass = 1;
     return MHE_OK;
 }
 
@@ -121,19 +157,27 @@ static mhe_status context_motion(simbody_context *c, mhe_error *err) {
     return status;
 }
 
+/* Up to so many coordinates all entries are looked at, beyond only the paths' own. */
+#define FEW_COORDINATES 8
+
 /* Derivatives of lengths are 0 but in each path's own coordinates. */
 static int lengths_finite(const simbody_context *c, const mhe_kinematics *out) {
-    size_t n_q = (size_t)c->tree->n_q;
+    size_t n_q = (size_t)c->tree->n_q, n_p = (size_t)c->tree->n_muscles;
     double sum = 0;
-    for (size_t p = 0; p < (size_t)c->tree->n_muscles; p++) {
+    if (n_q <= FEW_COORDINATES) {
+        return (out->length_q == NULL || many_finite(out->length_q, n_p * n_q)) &&
+               (out->length_qq == NULL || many_finite(out->length_qq, n_p * n_q * n_q));
+    }
+    for (size_t p = 0; p < n_p; p++) {
         const int32_t *own = c->own + c->own_start[p];
         int32_t n = c->own_start[p + 1] - c->own_start[p];
         for (int32_t i = 0; i < n; i++) {
             size_t row = p * n_q + (size_t)own[i];
-            sum += out->length_q != NULL ? out->length_q[row] * 0.0 : 0;
+            double of_row = out->length_q != NULL ? out->length_q[row] * 0.0 : 0;
             for (int32_t j = 0; j <= i && out->length_qq != NULL; j++) {
-                sum += out->length_qq[row * n_q + (size_t)own[j]] * 0.0;
+                of_row += out->length_qq[row * n_q + (size_t)own[j]] * 0.0;
             }
+            sum += of_row; /* the rows do not wait for each other */
         }
     }
     return sum == 0;
@@ -148,9 +192,9 @@ static int results_finite(const simbody_context *c, const mhe_kinematics *out) {
            (out->bias == NULL || all_finite(out->bias, n_q)) &&
            (out->length == NULL || all_finite(out->length, n_m)) && lengths_finite(c, out) &&
            (out->marker == NULL || all_finite(out->marker, n_k)) &&
-           (out->marker_q == NULL || all_finite(out->marker_q, n_k * n_q)) &&
+           (out->marker_q == NULL || many_finite(out->marker_q, n_k * n_q)) &&
            (out->body == NULL || all_finite(out->body, 12 * n_b)) &&
-           (out->body_q == NULL || all_finite(out->body_q, 6 * n_b * n_q));
+           (out->body_q == NULL || many_finite(out->body_q, 6 * n_b * n_q));
 }
 
 mhe_status simbody_kinematics(void *context, const double *q, const double *v,
@@ -247,22 +291,26 @@ mhe_status simbody_inverse_dynamics(void *context, const double *vdot, double *t
             dynamics_rates(t, c->links);
             c->has_rates = 1;
         }
-        dynamics_derivatives(t, c->links, c->by_angle, c->by_speed);
+        const int direct = t->direct;
+        dynamics_derivatives(t, c->links, direct && tau_q != NULL ? tau_q : c->by_angle,
+                             direct && tau_v != NULL ? tau_v : c->by_speed);
     }
-    if (tau_q != NULL) {
+    if (tau_q != NULL && !t->direct) {
         memset(tau_q, 0, n_q * n_q * sizeof *tau_q);
     }
-    if (tau_v != NULL) {
+    if (tau_v != NULL && !t->direct) {
         memset(tau_v, 0, n_q * n_q * sizeof *tau_v);
     }
-    chain_derivatives(c, vdot, tau_q, tau_v);
+    if (!t->direct) {
+        chain_derivatives(c, vdot, tau_q, tau_v);
+    }
     if (tau != NULL) {
         to_coordinates(c, c->torque, tau);
     }
-    int finite = (tau == NULL || all_finite(tau, n_q)) &&
-                 (tau_q == NULL || all_finite(tau_q, n_q * n_q)) &&
-                 (tau_v == NULL || all_finite(tau_v, n_q * n_q));
-    return finite ? MHE_OK : mhe_fail(err, MHE_RETRY, "a torque of the model is not finite");
+    const int sound = (tau == NULL || all_finite(tau, n_q)) &&
+                      (tau_q == NULL || all_finite(tau_q, n_q * n_q)) &&
+                      (tau_v == NULL || all_finite(tau_v, n_q * n_q));
+    return sound ? MHE_OK : mhe_fail(err, MHE_RETRY, "a torque of the model is not finite");
 }
 
 /* Solves a x = b in place of b by Cholesky, in place of a; not 0: a is not positive definite. */

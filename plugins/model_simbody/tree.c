@@ -113,6 +113,8 @@ static void tree_add_motion(const mhe_description *d, tree *t, const mhe_motion 
     joint->number = motion->coordinate;
     joint->coordinate = number_root(d, motion->coordinate);
     joint->function = &motion->function;
+    joint->affine = joint->number < d->n_coordinates && joint->function->n_pieces == 1 &&
+                    joint->function->n_coef == 2;
     memcpy(joint->p, at->p, sizeof joint->p);
     multiply3(at->r, turn, joint->r);
 
@@ -249,8 +251,12 @@ static void tree_build(const mhe_description *d, tree *t) {
     for (int32_t i = 0; i < d->n_markers; i++) {
         t->markers[i] = tree_point_at(places, d->markers[i].body, d->markers[i].location);
     }
+    t->direct = t->n_joints == t->n_q;
     for (int32_t i = 0; i < t->n_joints; i++) {
-        t->rounded |= off_orthogonal3(t->joints[i].r) > ROUNDING;
+        const tree_joint *joint = &t->joints[i];
+        t->rounded |= off_orthogonal3(joint->r) > ROUNDING;
+        t->direct =
+            t->direct && joint->affine && joint->number == i && joint->function->coef[1] == 1;
     }
     int32_t *chain = t->chains;
     for (int32_t i = 0; i < d->n_paths; i++) {

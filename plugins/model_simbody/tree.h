@@ -19,6 +19,7 @@ typedef struct tree_joint {
     int32_t number;               /* its value is function(coordinate of that number) */
     int32_t coordinate;           /* the free one that it is a function of */
     const mhe_function *function; /* the description's */
+    int32_t affine;               /* of the number itself: two coefficients in one piece */
     double r[9], p[3];            /* joint frame in the parent link */
     double mass, com[3];          /* of the moved link, in its own frame */
     double inertia[9];            /* about its centre of mass */
@@ -51,6 +52,7 @@ typedef struct tree {
     int32_t n_muscles; /* paths: the muscles' and all others */
     double gravity[3];
     int32_t rounded; /* a joint's frame is a rotation to the digits of a file only */
+    int32_t direct;  /* joint i moves as coordinate i does, all of them */
     tree_joint *joints;
     tree_place *bodies;   /* [n_bodies] */
     tree_point *markers;  /* [n_markers] */

@@ -15,25 +15,24 @@
 #include "hill.h"
 #include "shapes.h"
 
-static const double degroote_bells[3][4] = {
+const double hill_degroote_bells[3][4] = {
     {.8150671134243542, 1.055033428970575, .162384573599574, .063303448465465},
     {.433004984392647, .716775413397760, -.029947116970696, .200356847296188},
     {.1, 1, .353553390593274, 0}};
-static const double degroote_velocity[4] = {-0.3211346127989808, -8.149, -0.374,
-                                            0.8825327733249912};
+const double hill_degroote_velocity[4] = {-0.3211346127989808, -8.149, -0.374, 0.8825327733249912};
 #define DEGROOTE_SHORTEST 0.2 /* n at which the passive curve is 0 */
 
 static void degroote_curve(const struct hill_muscle *muscle, double a, double n, double s,
                            struct hill_value *out) {
     struct hill_shape fp =
         hill_exponential(n, muscle->passive_rate, muscle->passive_offset, muscle->passive_scale);
-    hill_total(a, hill_three_bells(degroote_bells, n), 0, hill_log_velocity(degroote_velocity, s),
-               fp, out);
+    hill_total(a, hill_three_bells(hill_degroote_bells, n), 0,
+               hill_log_velocity(hill_degroote_velocity, s), fp, out);
 }
 
 static void degroote_lengths(const struct hill_muscle *muscle, double n, struct hill_shape *fl,
                              struct hill_shape *fp) {
-    *fl = hill_three_bells(degroote_bells, n);
+    *fl = hill_three_bells(hill_degroote_bells, n);
     *fp = hill_exponential(n, muscle->passive_rate, muscle->passive_offset, muscle->passive_scale);
 }
 
@@ -41,7 +40,7 @@ static struct hill_shape degroote_speeds(const struct hill_muscle *muscle, doubl
                                          double *by_a) {
     (void)muscle, (void)a;
     *by_a = 0;
-    return hill_log_velocity(degroote_velocity, s);
+    return hill_log_velocity(hill_degroote_velocity, s);
 }
 
 static struct hill_shape degroote_rise(double rate, double strain) {
@@ -75,6 +74,7 @@ static void degroote_prepare(const mhe_muscle *muscle, const struct hill_config 
     const double shape = 4;
     hill_published_geometry(muscle, config, out);
     out->curve = degroote_curve;
+    out->many = HILL_MANY_DEGROOTE;
     out->passive_rate = shape / hill_or(muscle->passive_strain, 0.6);
     out->passive_offset = exp(out->passive_rate * (DEGROOTE_SHORTEST - 1));
     out->passive_scale = 1 / (exp(shape) - out->passive_offset);

@@ -50,6 +50,7 @@ static void paper_prepare(const mhe_muscle *muscle, const struct hill_config *co
                           struct hill_muscle *out) {
     int thelen = paper_says_thelen(muscle);
     out->curve = thelen ? paper_hill_thelen : paper_hill;
+    out->many = thelen ? HILL_MANY_NONE : HILL_MANY_PAPER;
     out->inv_cos = 1 / cos(hill_or(muscle->pennation_angle, 0));
     out->pull = 1;
     out->speed = PAPER_SPEED;

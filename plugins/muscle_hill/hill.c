@@ -110,9 +110,13 @@ static void hill_force(const struct hill *hill, const mhe_muscle_point *at,
     const double *a = at->state, *l = at->length, *w = at->velocity;
     const int reports = hill_reports(out);
     for (int32_t i = 0; i < hill->n; i++) {
-        const struct hill_muscle *m = &hill->m[i];
         struct hill_fibre fibre;
         struct hill_value value;
+        i = reports ? i : hill_forces_of_many(hill, i, at, out);
+        if (i == hill->n) {
+            return;
+        }
+        const struct hill_muscle *m = &hill->m[i];
         if (m->elastic) {
             hill_elastic_force(hill, i, at, out);
             continue;

@@ -54,8 +54,14 @@ typedef struct hill_shape (*hill_balance)(const struct hill_muscle *muscle, doub
                                           double *s);
 typedef struct hill_shape (*hill_tendon)(const struct hill_muscle *muscle, double x);
 
+/* Curves that are also there for several muscles side by side (many.c). */
+#define HILL_MANY_NONE 0
+#define HILL_MANY_PAPER 1 /* the type `hill` of paper2021 */
+#define HILL_MANY_DEGROOTE 2
+
 struct hill_muscle {
     hill_curve curve;
+    int32_t many;   /* HILL_MANY_* */
     double f_max;   /* N */
     double l_slack; /* m */
     double inverse; /* n per metre of fibre: 1 / l_opt */
@@ -128,6 +134,7 @@ struct hill {
     struct hill_muscle *m;        /* [n] */
     struct hill_millard *millard; /* [n], those of that set filled; NULL: none is */
     struct hill_file *file;       /* likewise */
+    double *columns;              /* [HILL_COLUMNS x n] of many.c */
     double *lower, *upper;        /* [n_states x n] */
     uint8_t *present;             /* [n_states x n] */
 };
@@ -137,6 +144,37 @@ struct hill {
 int32_t hill_parameters(const struct hill *hill, const char *const **names);
 void hill_by_parameters(const struct hill *hill, const mhe_muscle_point *at,
                         const mhe_muscle_values *out);
+
+/* Columns of hill->columns, of the fields of that name. */
+enum {
+    HILL_F_MAX,
+    HILL_L_SLACK,
+    HILL_INVERSE,
+    HILL_SPEED,
+    HILL_DAMPING,
+    HILL_PULL,
+    HILL_INV_COS,
+    HILL_HEIGHT,
+    HILL_PASSIVE_FROM,
+    HILL_PASSIVE_RAMP,
+    HILL_PASSIVE_RATE,
+    HILL_PASSIVE_OFFSET,
+    HILL_PASSIVE_SCALE,
+    HILL_COLUMNS
+};
+struct hill_columns {
+    const double *at[HILL_COLUMNS]; /* of the first muscle of a chunk */
+};
+
+/* many.c: fills hill->columns, the muscles being there; MHE_E_MEMORY. Forces of muscle `from` and
+ * those after it that are on the same curves; returns the first that is not done: `from` where they
+ * are not, or where only some of the derivatives are asked for. */
+mhe_status hill_make_columns(struct hill *hill);
+int32_t hill_forces_of_many(const struct hill *hill, int32_t from, const mhe_muscle_point *at,
+                            const mhe_muscle_values *out);
+
+/* curves_degroote2016.c: its constants, see hill_three_bells and hill_log_velocity. */
+extern const double hill_degroote_bells[3][4], hill_degroote_velocity[4];
 
 /* The fibre of a muscle with a rigid tendon at a musculotendon length and velocity. */
 struct hill_fibre {

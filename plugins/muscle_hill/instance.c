@@ -275,6 +275,9 @@ mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t 
     for (int32_t i = 0; i < n_muscles && status == MHE_OK; i++) {
         status = hill_fill(hill, i, &muscles[i], config, err);
     }
+    if (status == MHE_OK && hill_make_columns(hill) != MHE_OK) {
+        status = mhe_fail(err, MHE_E_MEMORY, "no memory for %d muscles", n_muscles);
+    }
     if (status == MHE_OK) {
         status = hill_states(hill, err);
     }
@@ -300,6 +303,7 @@ void hill_destroy(void *self) {
         free(hill->m);
         free(hill->millard);
         free(hill->file);
+        free(hill->columns);
         free(hill->lower);
         free(hill->upper);
         free(hill->present);

@@ -18,6 +18,7 @@
 #include <string.h>
 
 #define MOST_SETS 8
+#define MANY_SETS 40 /* of whole recordings with parameters */
 #define MOST_CORRECTIONS 3
 
 /* What lies in the way of a look at all variables. */
@@ -34,38 +35,53 @@ static int32_t first_of(const qp_shape *s, int32_t k) {
     return k < s->N ? 0 : s->n_u;
 }
 
+/* Places of the parameters, which are constants at a bound, as controls are. */
+static ptrdiff_t first_p(const qp_shape *s) {
+    return (ptrdiff_t)(s->N + 1) * s->ld_z;
+}
+
 /* The multipliers z_lower - z_upper stand in q->rhs while sets change. */
+static void guess_one(qp *q, ptrdiff_t at) {
+    const double below = q->z_lower[at], above = q->z_upper[at];
+    q->side[at] = 0;
+    if (q->fixed[at]) {
+        return;
+    }
+    if (active_is_equality(q, at) || (below > above && below > q->w[at] - q->lower[at])) {
+        q->side[at] = -1;
+    } else if (above > below && above > q->upper[at] - q->w[at]) {
+        q->side[at] = 1;
+    }
+    q->rhs[at] = q->side[at] == 0 ? 0 : below - above;
+}
+
 static void guess(qp *q) {
     const qp_shape *s = q->shape;
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = first_of(s, k); i < s->n_z; i++) {
-            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
-            const double below = q->z_lower[at], above = q->z_upper[at];
-            q->side[at] = 0;
-            if (q->fixed[at]) {
-                continue;
-            }
-            if (active_is_equality(q, at)) {
-                q->side[at] = -1;
-            } else if (below > above && below > q->w[at] - q->lower[at]) {
-                q->side[at] = -1;
-            } else if (above > below && above > q->upper[at] - q->w[at]) {
-                q->side[at] = 1;
-            }
-            q->rhs[at] = q->side[at] == 0 ? 0 : below - above;
+            guess_one(q, (ptrdiff_t)k * s->ld_z + i);
         }
+    }
+    for (ptrdiff_t at = first_p(s); at < first_p(s) + s->n_p; at++) {
+        guess_one(q, at);
     }
 }
 
 /* Where the program starts from: what is constant, all else 0; -> q->w. */
+static void set_constant(qp *q, ptrdiff_t at, int32_t state) {
+    q->held[at] = q->fixed[at] || (!state && q->side[at] != 0);
+    q->w[at] = q->fixed[at] ? q->lower[at] : q->held[at] ? active_bound(q, at) : 0;
+}
+
 static void set_constants(qp *q) {
     const qp_shape *s = q->shape;
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = 0; i < s->n_z; i++) {
-            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
-            q->held[at] = q->fixed[at] || (!is_state(s, i) && q->side[at] != 0);
-            q->w[at] = q->fixed[at] ? q->lower[at] : q->held[at] ? active_bound(q, at) : 0;
+            set_constant(q, (ptrdiff_t)k * s->ld_z + i, is_state(s, i));
         }
+    }
+    for (ptrdiff_t at = first_p(s); at < first_p(s) + s->n_p; at++) {
+        set_constant(q, at, 0);
     }
 }
 
@@ -84,6 +100,9 @@ static int32_t solve_set(qp *q, double regularisation) {
             q->slope[at] -= stiff ? ACTIVE_HOLD * (active_bound(q, at) - q->w[at]) + q->rhs[at] : 0;
         }
     }
+    for (ptrdiff_t at = first_p(s); at < first_p(s) + s->n_p; at++) {
+        q->diagonal[at] = regularisation;
+    }
     if (!qp_factor(q, q->held)) {
         return 0;
     }
@@ -92,6 +111,23 @@ static int32_t solve_set(qp *q, double regularisation) {
         q->w[i] += q->held[i] ? 0 : q->dw[i];
     }
     memcpy(q->lambda, q->dlambda, sizeof(double) * size_x(s));
+    return 1;
+}
+
+/* The same of one variable, whose slope is known; 1: it came to another side. */
+static int32_t see_one(qp *q, ptrdiff_t at, double crossed, double pulled, look *l) {
+    const double y = q->slope[at];
+    if (q->side[at] == 0) {
+        l->stationarity = fmax(l->stationarity, fabs(y));
+    } else {
+        l->feasibility = fmax(l->feasibility, fabs(q->w[at] - active_bound(q, at)));
+    }
+    q->rhs[at] = q->side[at] == 0 ? 0 : y;
+    if (!active_turn(q, at, q->w[at], y, crossed, pulled)) {
+        return 0;
+    }
+    l->changes++;
+    q->rhs[at] = 0;
     return 1;
 }
 
@@ -111,26 +147,18 @@ static look see(qp *q, const qp_limits *limits) {
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = first_of(s, k); i < s->n_z; i++) {
             const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
-            const double y = q->slope[at];
-            if (q->fixed[at]) {
+            if (q->fixed[at] || !see_one(q, at, crossed, pulled, &l)) {
                 continue;
             }
-            if (q->side[at] == 0) {
-                l.stationarity = fmax(l.stationarity, fabs(y));
-            } else {
-                l.feasibility = fmax(l.feasibility, fabs(q->w[at] - active_bound(q, at)));
-            }
-            q->rhs[at] = q->side[at] == 0 ? 0 : y;
-            if (active_turn(q, at, q->w[at], y, crossed, pulled)) {
-                l.changes++;
-                q->rhs[at] = 0;
-                if (i >= simple) {
-                    q->turned[i - simple] = 1;
-                } else if (i >= first_control && i < first_control + m) {
-                    q->turned[i - first_control] = 1;
-                }
+            if (i >= simple) {
+                q->turned[i - simple] = 1;
+            } else if (i >= first_control && i < first_control + m) {
+                q->turned[i - first_control] = 1;
             }
         }
+    }
+    for (ptrdiff_t at = first_p(s); at < first_p(s) + s->n_p; at++) {
+        (void)(q->fixed[at] || see_one(q, at, crossed, pulled, &l));
     }
     return l;
 }
@@ -201,7 +229,8 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
     guess(q);
     int32_t result = QP_LIMIT;
     look l = {0};
-    for (q->iterations = 0; q->iterations < MOST_SETS && result == QP_LIMIT;) {
+    for (q->iterations = 0;
+         q->iterations < (s->n_p > 0 ? MANY_SETS : MOST_SETS) && result == QP_LIMIT;) {
         if (limits->is_late != NULL && limits->is_late(limits->data)) {
             result = QP_LATE;
             break;

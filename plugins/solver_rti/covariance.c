@@ -120,10 +120,17 @@ static mhe_status find(rti_solver *s, mhe_error *err) {
     }
     hold(s);
     s->qp.stages = s->trial.stages;
+    if (shape->n_p > 0) {
+        border_begin(&s->qp);
+    }
     if (!riccati_factor(&s->qp.riccati, s->trial.stages, s->qp.diagonal) ||
-        riccati_is_singular(&s->qp.riccati) || (shape->n_p > 0 && !border_factor(&s->qp))) {
+        riccati_is_singular(&s->qp.riccati) ||
+        (shape->n_p > 0 && !border_factor(&s->qp, s->qp.fixed))) {
         return mhe_fail(err, MHE_E_NUMERIC,
                         "the costs do not determine the solution: their Hessian is singular");
+    }
+    if (shape->n_p > 0) {
+        border_answers(&s->qp);
     }
     riccati_first(&s->qp.riccati, s->spread);
     for (int32_t k = 0; k < shape->N; k++) {

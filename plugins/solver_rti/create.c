@@ -76,6 +76,7 @@ static void place(rti_solver *s, block *b) {
     s->rest = cut_doubles(b, n_u * (size_t)shape->ld_z);
     s->joint = cut_doubles(b, (n_x + n_u) * (size_t)shape->ld_z);
     s->lambda = cut_doubles(b, x);
+    s->weight = cut_doubles(b, x);
     s->gaps = cut_doubles(b, x);
     s->stage_cost = cut_doubles(b, n_stages);
     s->stage_status = cut(b, n_stages * sizeof(mhe_status));

@@ -163,16 +163,15 @@ static void add(int32_t m, int32_t n, double alpha, const double *A, int32_t ld,
 
 /* A block of four rows and columns. */
 static inline void transpose_four(const double *A, int32_t ld_a, double *B, int32_t ld_b) {
-    typedef int64_t order __attribute__((vector_size(32)));
     const vec4 a = AT(A), b = AT(A + ld_a), c = AT(A + 2 * ld_a), d = AT(A + 3 * ld_a);
-    const vec4 ab = __builtin_shuffle(a, b, (order){0, 4, 2, 6}),
-               ba = __builtin_shuffle(a, b, (order){1, 5, 3, 7}),
-               cd = __builtin_shuffle(c, d, (order){0, 4, 2, 6}),
-               dc = __builtin_shuffle(c, d, (order){1, 5, 3, 7});
-    PUT(B) = __builtin_shuffle(ab, cd, (order){0, 1, 4, 5});
-    PUT(B + ld_b) = __builtin_shuffle(ba, dc, (order){0, 1, 4, 5});
-    PUT(B + 2 * ld_b) = __builtin_shuffle(ab, cd, (order){2, 3, 6, 7});
-    PUT(B + 3 * ld_b) = __builtin_shuffle(ba, dc, (order){2, 3, 6, 7});
+    const vec4 ab = __builtin_shufflevector(a, b, 0, 4, 2, 6),
+               ba = __builtin_shufflevector(a, b, 1, 5, 3, 7),
+               cd = __builtin_shufflevector(c, d, 0, 4, 2, 6),
+               dc = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    PUT(B) = __builtin_shufflevector(ab, cd, 0, 1, 4, 5);
+    PUT(B + ld_b) = __builtin_shufflevector(ba, dc, 0, 1, 4, 5);
+    PUT(B + 2 * ld_b) = __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+    PUT(B + 3 * ld_b) = __builtin_shufflevector(ba, dc, 2, 3, 6, 7);
 }
 
 /* Rows [from, m) of A, columns [first, n). */

@@ -355,6 +355,16 @@ double rti_gap_sum(const rti_solver *s, const rti_point *point) {
     return sum;
 }
 
+double rti_weighted_gaps(const rti_solver *s, const rti_point *point) {
+    double sum = 0;
+    for (int32_t k = 0; k < s->shape.N; k++) {
+        for (int32_t i = 0; i < s->shape.n_x; i++) {
+            sum += row_x(&s->shape, s->weight, k)[i] * fabs(point->stages[k].b[i]);
+        }
+    }
+    return sum;
+}
+
 /* Optimality of the variable at place `at` of all w. */
 static void add_variable(const rti_solver *s, const rti_point *point, ptrdiff_t at,
                          const double *z_lower, const double *z_upper, rti_residuals *r) {

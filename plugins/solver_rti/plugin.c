@@ -34,7 +34,8 @@ static const mhe_option rti_options[] = {
                  "first start."),
     MHE_OPT_REAL(struct rti_config, settled, 0.05, 1e-12, 1e12, "1",
                  "speed, balanced: largest last change of the first control and the second state "
-                 "(rad, rad/s, 1) of a converged window."),
+                 "(rad, rad/s, 1) of a converged window; torques beside activations count in "
+                 "proportion to their sigmas."),
     MHE_OPT_REAL(struct rti_config, spin, 50e-6, 0, 1, "s",
                  "How long threads look for work before they sleep."),
 };

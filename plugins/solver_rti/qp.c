@@ -6,6 +6,8 @@
 
 #define MOST_SKIPPED 15 /* programs that are not tried by sets after one whose sets cycled */
 
+#define BORDER_BYTES ((sizeof(qp_border) + 63) / 64 * 64)
+
 /* Of the recursions, which share their memory. */
 static size_t recursion_size(const qp_shape *s) {
     const size_t one = riccati_size(s), other = kalman_size(s);
@@ -15,8 +17,8 @@ static size_t recursion_size(const qp_shape *s) {
 size_t qp_size(const qp_shape *s) {
     const size_t z = size_z(s), x = size_x(s);
     const size_t doubles = (4 + 8) * z + (1 + 5) * x + recursion_size(s) + border_size(s);
-    const size_t bytes =
-        (s->n_p > 0 ? 64 : 0) + sizeof(double) * doubles + sizeof(qp_side) * 2 * z + 2 * z + x;
+    const size_t bytes = (s->n_p > 0 ? BORDER_BYTES : 0) + sizeof(double) * doubles +
+                         sizeof(qp_side) * 2 * z + 2 * z + x;
     return (bytes + 63) / 64 * 64;
 }
 
@@ -42,7 +44,7 @@ void qp_place(qp *q, const qp_shape *s, void *memory) {
     }
     double *recursion = take(&m, recursion_size(s)), *columns = take(&m, border_size(s));
     if (s->n_p > 0) {
-        q->border = (qp_border *)take(&m, 64 / sizeof *m);
+        q->border = (qp_border *)take(&m, BORDER_BYTES / sizeof *m);
         border_place(q->border, s, columns);
     }
     q->sides = (qp_side *)m;
@@ -76,7 +78,7 @@ int32_t qp_factor(qp *q, const uint8_t *held) {
     }
     q->riccati.fixed = held;
     return riccati_factor(&q->riccati, q->stages, q->diagonal) &&
-           (q->shape->n_p == 0 || border_factor(q));
+           (q->shape->n_p == 0 || border_factor(q, held));
 }
 
 void qp_newton(qp *q, const double *g, const double *b, double *w, double *lambda) {
@@ -122,8 +124,11 @@ int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t
     if (q->recursion == QP_KALMAN) {
         kalman_begin(&q->kalman, stages);
     }
+    if (s->n_p > 0) {
+        border_begin(q);
+    }
     q->programs++;
-    if (!warm || s->n_p > 0 || !q->first_is_fixed || q->skipped < q->to_skip) {
+    if (s->n_p == 0 && (!warm || !q->first_is_fixed || q->skipped < q->to_skip)) {
         q->skipped++;
         return inside_solve(q, limits, warm);
     }

@@ -73,22 +73,32 @@ typedef struct qp {
 
 /* ---- border.c: parameters, by the Schur complement of their columns ----
  *
- * What the stages answer to each parameter, W_j and Lambda_j, is a solve of its own; S = sum D +
- * diag d_p + sum (C W - P^T Lambda) is what is left for p. */
+ * Where w minimises the program for given p, its cost is 1/2 p^T S p + ...: S = sum D + diag d_p,
+ * less what the stages give way. */
 typedef struct qp_border {
-    double *W, *Lambda; /* [n_p][size_z], [n_p][size_x] */
-    double *S;          /* [n_p x n_p], then its Cholesky factor, lower */
-    double *dp;         /* [ld_p] */
+    double *W;     /* [n_p][size_z] the stages' answer to each parameter, see border_answers() */
+    double *g, *b; /* [size_z], [size_x] scratch of a solve */
+    double *D;     /* [n_p x ld_p] sum over the stages */
+    double *sum;   /* [n_p x ld_p] S while it grows, upper triangle */
+    double *S;     /* [n_p x n_p] its Cholesky factor, lower */
+    double *dp;    /* [ld_p] */
+    double *room;  /* of a stage */
+    const uint8_t *held; /* [size_z] of border_factor() */
 } qp_border;
 
 size_t border_size(const qp_shape *s); /* doubles */
 void border_place(qp_border *border, const qp_shape *s, double *memory);
-/* After riccati_factor(). 0: S is not positive definite. */
-int32_t border_factor(qp *q);
+/* Once for new stages. */
+void border_begin(qp *q);
+/* After riccati_factor(); parameters that are `held` [size_z] are constants. 0: S is not positive
+ * definite. */
+int32_t border_factor(qp *q, const uint8_t *held);
 /* S^-1 of `p` [n_p], in place. */
 void border_solve(const qp *q, double *p);
 /* riccati_solve() with p: g ends with its row, and so does w. */
 void border_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
+/* W, for covariances; overwrites rest_w, rest_x, dlambda. */
+void border_answers(qp *q);
 
 #define QP_RICCATI 1
 #define QP_KALMAN 2

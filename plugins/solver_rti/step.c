@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define MAX_HALVINGS 8
+#define MOST_LOOSE 1e3
 #define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
 #define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
 #define MOST_DAMPING 1e9
@@ -35,14 +36,23 @@ static int32_t is_late(const void *data) {
     return is_over(data, 1);
 }
 
+/* How far from its limits the program of a whole recording may stay while the iterate is far from
+ * the solution: which of ten thousand bounds hold to the last digit is then no news. */
+static double looseness(const rti_solver *s) {
+    return s->shape.n_p == 0
+               ? 1
+               : fmin(fmax(0.1 * rti_excess(&s->residuals) / s->config->tolerance, 1), MOST_LOOSE);
+}
+
 /* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
  * closely: what is left of them, times large multipliers, is noise in the merit function. */
 static int32_t solve_program(rti_solver *s, int32_t from_last) {
     qp *q = &s->qp;
     const size_t n = size_z(&s->shape);
-    const qp_limits limits = {.stationarity = 0.1 * s->config->tolerance,
-                              .feasibility = fmax(1e-4 * s->config->tolerance, 1e-12),
-                              .complementarity = 0.01 * s->config->tolerance,
+    const double tolerance = s->config->tolerance * looseness(s);
+    const qp_limits limits = {.stationarity = 0.1 * tolerance,
+                              .feasibility = fmax(1e-4 * tolerance, 1e-12),
+                              .complementarity = 0.01 * tolerance,
                               .max_iterations = s->config->max_qp_iterations,
                               .regularisation = 1e-9,
                               .is_late = s->control != NULL ? is_late : NULL,
@@ -77,6 +87,23 @@ static double longest(const rti_solver *s, int32_t from, int32_t n) {
     double length = 0;
     for (int32_t i = from; i < from + n; i++) {
         length = fmax(length, fabs(s->trial.w[i] - s->here.w[i]));
+    }
+    return length;
+}
+
+/* The same of the first controls, where some may be torques of hundreds of N m and others parts of
+ * a whole: a control that the cost bends less than the most bent one counts for as much less (equal
+ * parts of their sigmas count alike), but never for less than its part of its range. */
+static double longest_control(const rti_solver *s) {
+    const double *H = s->here.stages[0].H;
+    double most = 0, length = 0;
+    for (int32_t i = 0; i < s->shape.n_u; i++) {
+        most = fmax(most, H[i * (s->shape.ld_z + 1)]);
+    }
+    for (int32_t i = 0; i < s->shape.n_u; i++) {
+        const double bent = most > 0 ? H[i * (s->shape.ld_z + 1)] / most : 1;
+        const double part = fmax(sqrt(fmax(bent, 0)), 1 / (s->upper[i] - s->lower[i]));
+        length = fmax(length, fmin(part, 1) * fabs(s->trial.w[i] - s->here.w[i]));
     }
     return length;
 }
@@ -201,8 +228,8 @@ static int32_t leap(rti_solver *s, int32_t result) {
                 return RTI_LATE;
             }
             leap->taken = 1;
-            leap->front = fmax(longest(s, 0, s->shape.n_u),
-                               longest(s, s->shape.ld_z + s->shape.n_u, s->shape.n_x));
+            leap->front =
+                fmax(longest_control(s), longest(s, s->shape.ld_z + s->shape.n_u, s->shape.n_x));
             double *const from = s->here.w;
             s->here.w = s->trial.w;
             s->trial.w = from;
@@ -250,7 +277,19 @@ int32_t rti_step_full(rti_solver *s) {
 /* ---- globalised by an exact penalty: merit = cost + penalty * sum |gap| ---- */
 
 static double merit(const rti_solver *s, const rti_point *point) {
-    return point->cost + s->penalty * rti_gap_sum(s, point);
+    return point->cost +
+           (s->shape.n_p > 0 ? rti_weighted_gaps(s, point) : s->penalty * rti_gap_sum(s, point));
+}
+
+/* Each gap a penalty of its own, above its multiplier, that falls again by halves (Powell 1978): in
+ * a problem of a thousand gaps of all kinds the largest multiplier of all would forbid every step
+ * that bends. */
+static double raise_weights(rti_solver *s) {
+    for (size_t i = 0; i < size_x(&s->shape); i++) {
+        const double least = 1.1 * fabs(s->qp.lambda[i]);
+        s->weight[i] = fmax(least, 0.5 * (s->weight[i] + least));
+    }
+    return rti_weighted_gaps(s, &s->here);
 }
 
 /* Slope of the merit function along the step; raises the penalty above the multipliers first. */
@@ -269,7 +308,8 @@ static double merit_slope(rti_solver *s) {
             slope += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
         }
     }
-    return fmin(slope - s->penalty * s->gap_sum, 0);
+    const double gaps = s->shape.n_p > 0 ? raise_weights(s) : s->penalty * s->gap_sum;
+    return fmin(slope - gaps, 0);
 }
 
 /* Is the trial point good enough after this length? Its merit must be known. */

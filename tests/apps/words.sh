@@ -29,11 +29,12 @@ refused "unknown option '--input'" mhe-sim noise a.yaml --input b.sto
 refused "--rate 'fast': a number of Hz above 0 is needed" mhe-sim follow a.yaml --rate fast
 refused "a config file and --input are needed" mhe-sim forward a.yaml
 refused "no study file is given" mhe-study run
+refused "no config file is given" mhe-calibrate
 refused "no results folder is given" mhe-study merge
 refused "--shard: '8/8' is not like 0/8" mhe-study run a.yaml --shard 8/8
 refused "--workers: '0' is no whole number from 1 to" mhe-study run a.yaml --workers 0
 
-for program in mhe-run mhe-bench mhe-sim mhe-study; do
+for program in mhe-run mhe-bench mhe-sim mhe-study mhe-calibrate; do
     page=$build/share/man/man1/$program.1 completion=$build/share/bash-completion/completions/$program
     options=$("$bin/$program" --help | grep -oE '^  --[a-z-]+' | sort -u)
     [ -n "$options" ] || { echo "FAILED: $program --help shows no option" && failed=1; }

@@ -401,7 +401,7 @@ static void tables_are_documented(void **state) {
     (void)state;
     int32_t n = 0, n_options = 0;
     const mhi_section *sections = mhi_run_sections(&n);
-    assert_int_equal(n, 18);
+    assert_int_equal(n, 19);
     for (int32_t i = 0; i < n; i++) {
         mhe_error err = {0};
         mhi_options_check(sections[i].options, sections[i].n_options, 4096, &err);

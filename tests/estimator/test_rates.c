@@ -19,6 +19,8 @@
     "costs: [mhe.cost.min-excitation, {plugin: mhe.cost.track, signal: qdot, sigma: 0.5}]\n"
 #define DATA "markers: " MODELS "demo_markers.trc, reference: " MODELS "demo_reference.sto"
 
+#define ANGLES "angles: " MODELS "demo_reference.sto, reference: " MODELS "demo_reference.sto"
+
 typedef struct seen {
     double rates[N_FRAMES][N_Q], qdot[N_FRAMES][N_Q]; /* what an estimate's node tracked, and is */
     double activation[N_FRAMES][N_M], control[N_FRAMES][N_M];
@@ -82,6 +84,23 @@ static void rates_are_those_of_the_motion(void **state) {
     assert_true(squares < 0.01 * truth); /* a tenth of the velocity */
 }
 
+/* Angles measured elsewhere, without a marker: their slopes. */
+static void rates_of_measured_angles(void **state) {
+    static seen s;
+    double squares = 0, truth = 0;
+    (void)state;
+    run(HEAD "data: {" ANGLES ", rates: true}\n", 0, 0, 1, &s);
+    assert_true(s.n > 15);
+    for (int32_t k = 1; k < s.n; k++) {
+        for (int32_t i = 0; i < N_Q; i++) {
+            assert_true(isfinite(s.rates[k][i]));
+            squares += pow(s.rates[k][i] - s.truth[k][i], 2);
+            truth += pow(s.truth[k][i], 2);
+        }
+    }
+    assert_true(squares < 0.01 * truth);
+}
+
 static void rates_are_missing_beside_missing_markers(void **state) {
     static seen s;
     int32_t n_missing = 0;
@@ -117,6 +136,7 @@ static void held_controls_meet_at_nodes(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(rates_are_those_of_the_motion),
+        cmocka_unit_test(rates_of_measured_angles),
         cmocka_unit_test(rates_are_missing_beside_missing_markers),
         cmocka_unit_test(without_there_is_no_such_channel),
         cmocka_unit_test(held_controls_meet_at_nodes),

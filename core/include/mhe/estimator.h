@@ -151,6 +151,7 @@ typedef struct mhe_estimator_info {
     int32_t n_joints;               /* that reactions are given of; 0: output.reactions is none */
     const char *const *joint_names; /* [n_joints] "hip_r_on_femur_r_in_femur_r": the joint, the
                                      * body it carries, whose axes */
+    int32_t uncertainty;            /* 1: estimates have standard deviations (q_sd ...) */
 } mhe_estimator_info;
 
 /* Row i of the table. [any] */
@@ -215,6 +216,13 @@ typedef struct mhe_estimate {
                                   * could be found */
     int32_t programs, fallbacks; /* quadratic programs of its solve, and those of them that the
                                   * solver's fast method gave up and the safe one solved */
+    /* Standard deviations, where output.uncertainty asks for them, else NULL: what the config's
+     * section `uncertainty` says of measurements and model, carried through the estimator to first
+     * order. */
+    const double *q_sd;          /* [n_q], rad (m) */
+    const double *activation_sd; /* [n_muscles] */
+    const double *force_sd;      /* [n_muscles], N */
+    const double *moment_sd;     /* [n_q], N m */
 } mhe_estimate;
 
 /* Values of a block of an estimate [block->count]; NULL: it is no state or control. [any] */

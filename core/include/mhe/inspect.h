@@ -51,6 +51,16 @@ MHE_API mhe_status mhe_model_evaluate(const mhe_host *host, const char *file, co
                                       const char *poses, size_t length, int32_t paths, char **text,
                                       mhe_error *err);
 
+/* Scales a generic model to a person as a Scale setup of OpenSim's says (<ScaleTool>; files beside
+ * it): bodies by distances of markers in a static trial and by factors stated; with them joints,
+ * paths, obstacles, masses, and each muscle's optimal fibre and tendon slack length by that of its
+ * path in the default pose. Then the markers are moved to where the static pose has them. Writes
+ * the model to the file `out`; `*text` says what was done, for people, and is the caller's:
+ * mhe_free(). Inertias are stretched with the body, at any factors; OpenSim takes a cylinder where
+ * factors differ. MHE_E_INPUT: "file:line: what is wrong". `host` may be NULL. [cold] */
+MHE_API mhe_status mhe_model_scale(const mhe_host *host, const char *setup, const char *out,
+                                   char **text, mhe_error *err);
+
 #ifdef __cplusplus
 }
 #endif

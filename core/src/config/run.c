@@ -64,11 +64,12 @@ static mhe_status read_top(const struct reader *r) {
     int32_t n = 0, n_top = 0;
     const mhi_section *sections = mhi_run_sections(&n);
     const mhe_option *options = mhi_run_section("", &n_top);
-    const char **names = MHI_TAKE(&run->arena, const char *, n);
+    const char **names = MHI_TAKE(&run->arena, const char *, n + 1);
     if (names == NULL) {
         return no_memory(r);
     }
     int32_t n_names = 0;
+    names[n_names++] = "calibrate";   /* mhe-calibrate's own (calibrate/plan.h) */
     for (int32_t i = 1; i < n; i++) { /* 0 is the top level itself */
         const int costs = strcmp(sections[i].name, "costs") == 0;
         if (strchr(sections[i].name, '.') == NULL) {

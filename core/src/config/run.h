@@ -139,11 +139,23 @@ typedef struct mhi_realtime_section {
 typedef struct mhi_output_section {
     const char *node_name; /* as written; "auto" is left to the program */
     int32_t node;          /* what it means: 0 .. window; "auto": 0 */
-    int32_t picture;   /* draw estimated against reference with gnuplot, where it is installed */
-    int32_t reactions; /* MHI_IN_* of model/joints.h */
+    int32_t picture;     /* draw estimated against reference with gnuplot, where it is installed */
+    int32_t reactions;   /* MHI_IN_* of model/joints.h */
+    int32_t uncertainty; /* 1: standard deviations of the estimates are given */
     mhe_text_list formats;         /* of "sto", "csv", "mat"; .sto is written in any case */
     int32_t skip_first, skip_last; /* estimates left out of the errors in summary.json */
 } mhi_output_section;
+
+/* Standard deviations of what the estimates rest on, for output.uncertainty. */
+typedef struct mhi_uncertainty_section {
+    double marker_noise, marker_offset;    /* m */
+    double emg_noise, emg_gain, emg_floor; /* of the channel's variation; of the value; 1 */
+    int32_t emg_measured;                  /* 1: emg_noise is scaled by what residuals show */
+    double control;                        /* without EMG, 1 */
+    double max_isometric_force;            /* a part of it, as the next two */
+    double optimal_fiber_length, tendon_slack_length;
+    double path_length; /* m */
+} mhi_uncertainty_section;
 
 typedef struct mhi_run {
     const char *path; /* of the config file */
@@ -166,6 +178,7 @@ typedef struct mhi_run {
     mhi_bounds_section bounds;
     mhi_realtime_section realtime;
     mhi_output_section output;
+    mhi_uncertainty_section uncertainty;
     mhi_tree *tree;
     mhi_arena arena; /* all of the above */
 } mhi_run;

@@ -78,9 +78,9 @@ static const mhe_option data_options[] = {
                 "kinematics tasks (.xml), whose coordinate tasks count too; or both, {file: PATH, "
                 "MARKER: WEIGHT}."),
     MHE_OPT_BOOL(mhi_data_section, rates, 0,
-                 "Joint velocities by inverse kinematics from frame to frame, which the signal "
-                 "qdot is to be close to where a cost follows it: they keep light segments from "
-                 "swinging between the frames."),
+                 "Joint velocities by inverse kinematics (or the measured angles) from frame to "
+                 "frame, which the signal qdot is to be close to where a cost follows it: they "
+                 "keep light segments from swinging between the frames."),
     MHE_OPT_TEXT(mhi_data_section, subject, 0, NULL,
                  "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };
@@ -225,10 +225,41 @@ static const mhe_option output_options[] = {
     MHE_OPT_ENUM(mhi_output_section, reactions, "none", "none|child|parent|ground",
                  "What joints transmit, force and moment on the child at the joint's centre, in "
                  "the axes of the child, of the parent or of ground (reactions.sto)."),
+    MHE_OPT_BOOL(mhi_output_section, uncertainty, 0,
+                 "Give standard deviations of angles, activations, forces and moments "
+                 "(uncertainty.sto): what the section uncertainty says of measurements and model, "
+                 "carried through the estimator. Rigid tendons only."),
     MHE_OPT_INT(mhi_output_section, skip_first, 5, 0, INT32_MAX, "estimates",
                 "Estimates at the start that the errors in summary.json leave out."),
     MHE_OPT_INT(mhi_output_section, skip_last, 0, 0, INT32_MAX, "estimates",
                 "Estimates at the end that the errors in summary.json leave out."),
+};
+
+/* Of a generic model that was scaled and not calibrated. */
+static const mhe_option uncertainty_options[] = {
+    MHE_OPT_REAL(mhi_uncertainty_section, marker_noise, 0.001, 0, 1, "m",
+                 "Of a marker's coordinate, from frame to frame."),
+    MHE_OPT_REAL(mhi_uncertainty_section, marker_offset, 0.005, 0, 1, "m",
+                 "Of a marker's place in its segment, each coordinate, for the whole recording."),
+    MHE_OPT_REAL(mhi_uncertainty_section, emg_noise, 0.5, 0, 10, "1",
+                 "Of slow errors of EMG, as a share of how much its channel varies."),
+    MHE_OPT_BOOL(mhi_uncertainty_section, emg_measured, 1,
+                 "Scale emg_noise by what the differences of EMG and muscle control show, once "
+                 "there are some."),
+    MHE_OPT_REAL(mhi_uncertainty_section, emg_gain, 0.2, 0, 10, "1",
+                 "Of a channel's gain (electrode, maximal contraction), as a share."),
+    MHE_OPT_REAL(mhi_uncertainty_section, emg_floor, 0.005, 0, 1, "1",
+                 "Of EMG in any case, as a share of maximal contraction."),
+    MHE_OPT_REAL(mhi_uncertainty_section, control, 0.2, 0, 1, "1",
+                 "Of the control of a muscle without EMG about what the costs draw it to."),
+    MHE_OPT_REAL(mhi_uncertainty_section, max_isometric_force, 0.3, 0, 10, "1",
+                 "Of a muscle's maximal force, as a share."),
+    MHE_OPT_REAL(mhi_uncertainty_section, optimal_fiber_length, 0.05, 0, 0.5, "1",
+                 "Of its optimal fibre length, as a share."),
+    MHE_OPT_REAL(mhi_uncertainty_section, tendon_slack_length, 0.03, 0, 0.5, "1",
+                 "Of its tendon's slack length, as a share."),
+    MHE_OPT_REAL(mhi_uncertainty_section, path_length, 0.003, 0, 1, "m",
+                 "Of the length of its path (insertions)."),
 };
 
 static const mhe_option source_options[] = {
@@ -280,6 +311,10 @@ static const mhi_section sections[] = {
     SECTION("solver", "How a window is solved.", MHE_SOLVER_IFACE, solver_options, AT(solver)),
     SECTION("realtime", "Limits of live use.", NULL, realtime_options, AT(realtime)),
     SECTION("output", "What is made of the results.", NULL, output_options, AT(output)),
+    SECTION("uncertainty",
+            "Standard deviations of what estimates rest on, for output.uncertainty; by default "
+            "those of a model that was scaled and not calibrated.",
+            NULL, uncertainty_options, AT(uncertainty)),
     LIST("sources", "A list: where live data come from (mhe-live).", MHE_SOURCE_IFACE,
          source_options, AT(sources), 1),
     LIST("sinks", "A list: where live estimates go (mhe-live).", MHE_SINK_IFACE, sink_options,

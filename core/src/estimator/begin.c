@@ -223,6 +223,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     e->window.has_left = 0;
     mhi_phase_on(e, MHI_EVENT_BEGUN);
     e->begin.rounds = 0;
+    mhi_bands_forget(e->bands);
     mhi_window_set_bounds(e);
     if (e->window.solved == 0) {
         bound_first_state(e);

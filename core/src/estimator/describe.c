@@ -33,7 +33,8 @@ mhe_status mhe_estimator_describe(const mhe_estimator *e, mhe_estimator_info *in
                                      .layout = p->layout,
                                      .n_joints =
                                          e->reactions != NULL ? e->description->n_bodies : 0,
-                                     .joint_names = e->joint_names};
+                                     .joint_names = e->joint_names,
+                                     .uncertainty = e->bands != NULL};
     return mhi_give(__func__, info, &ours, NULL);
 }
 

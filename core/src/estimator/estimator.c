@@ -254,6 +254,9 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
     if (status == MHE_OK) {
         mhi_pace_create(e);
     }
+    if (status == MHE_OK && run->output.uncertainty) {
+        status = mhi_bands_create(e, &e->bands, err);
+    }
     if (status == MHE_OK) {
         status = start_from_config(e, err);
     }
@@ -280,6 +283,7 @@ void mhe_estimator_close(mhe_estimator *e) {
     if (e == NULL) {
         return;
     }
+    mhi_bands_free(e->bands);
     mhi_begin_free(&e->begin);
     mhi_rates_free(&e->rates);
     mhi_channels_free(&e->channels);
@@ -319,6 +323,7 @@ void mhi_estimator_set_state(mhe_estimator *e, const double *x) {
 
 void mhi_estimator_set_node(mhe_estimator *e, int32_t node) {
     e->node = node;
+    mhi_bands_set_node(e->bands, node);
 }
 
 void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {

@@ -10,6 +10,7 @@
 #define MHI_ESTIMATOR_PRIVATE_H
 
 #include "base/arena.h"
+#include "estimator/bands.h"
 #include "estimator/begin.h"
 #include "estimator/channel.h"
 #include "estimator/clock.h"
@@ -58,6 +59,7 @@ struct mhe_estimator {
     mhi_rates rates;
     mhi_pace pace;
     mhi_output output;
+    mhi_bands *bands;     /* NULL: not wanted */
     const double **given; /* [channels] what the frame in work says, scratch */
     mhi_arena arena;
 };

@@ -116,10 +116,11 @@ static mhe_status find_node(mhe_estimator *e, double time, int32_t *used, mhe_er
     return MHE_OK;
 }
 
-/* The velocities that the newest node's markers say. The posture is looked for near the last one,
- * at first near what the model stands at. */
+/* The velocities that the newest node's markers and angles say. The posture is looked for near the
+ * last one, at first near what the model stands at. */
 static void take_rates(mhe_estimator *e, int32_t k) {
     const mhi_channel *markers = mhi_channels_find(&e->channels, MHI_SIGNAL_MARKERS);
+    const mhi_channel *angles = mhi_channels_find(&e->channels, MHI_SIGNAL_Q);
     mhi_channel *rates = mhi_channels_find(&e->channels, MHI_SIGNAL_QDOT);
     if (rates == NULL) {
         return;
@@ -131,7 +132,8 @@ static void take_rates(mhe_estimator *e, int32_t k) {
                                           : e->description->coordinates[i].value;
     }
     mhi_pace_postures(e, 1);
-    mhi_rates_take(&e->rates, k, e->window.times, mhi_row(markers->believed, k, 3 * e->n_k), near,
+    mhi_rates_take(&e->rates, k, e->window.times, mhi_row(markers->believed, k, 3 * e->n_k),
+                   angles == NULL ? NULL : mhi_row(angles->believed, k, e->n_q), near,
                    e->trust.outlier, rates);
     mhi_pace_postures(e, 0);
 }
@@ -178,6 +180,9 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
     if (status == MHE_OK) {
         mhi_trust_solved(e, estimate->status);
         status = mhi_output_give(e, e->node, estimate, err);
+        if (status == MHE_OK) {
+            mhi_bands_give(e, e->node, estimate);
+        }
         estimate->latency = mhi_seconds() - e->pace.arrival;
         estimate->solve_time = estimate->latency + e->pace.ahead;
         estimate->iterations = info.iterations;

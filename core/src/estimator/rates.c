@@ -22,6 +22,7 @@ mhe_status mhi_rates_create(mhi_rates *r, const mhi_run *run, const mhi_system *
     const mhe_status status = mhi_start_create(system, context, &r->start, err);
     if (status == MHE_OK) {
         mhi_start_set_tasks(r->start, tasks);
+        mhi_start_set_enough(r->start, 1e-6);
     }
     return status;
 }
@@ -53,7 +54,15 @@ void mhi_rates_shift(mhi_rates *r) {
     }
 }
 
-/* Slope from node `a` to node `b` -> v; NaN where one of them has no posture. */
+static int32_t any(const mhi_rates *r, const double *values) {
+    int32_t found = 0;
+    for (int32_t i = 0; i < r->n_q && !found; i++) {
+        found = !isnan(values[i]);
+    }
+    return found;
+}
+
+/* Slope from node `a` to node `b` -> v; NaN where one of them is not known. */
 static void slope(mhi_rates *r, int32_t a, int32_t b, const double *times) {
     const double span = times[b] - times[a];
     for (int32_t i = 0; i < r->n_q; i++) {
@@ -61,35 +70,48 @@ static void slope(mhi_rates *r, int32_t a, int32_t b, const double *times) {
     }
 }
 
-static void put(mhi_channel *c, int32_t k, const double *v) {
-    if (!isnan(v[0])) {
-        mhi_channel_set(c, k, v);
+static void put(mhi_rates *r, mhi_channel *c, int32_t k) {
+    if (any(r, r->v)) {
+        mhi_channel_set(c, k, r->v);
+    }
+}
+
+/* The posture by inverse kinematics, if one comes near. */
+static void find_posture(mhi_rates *r, int32_t k, const double *markers, const double *near,
+                         double outlier) {
+    double distance = NAN;
+    memcpy(r->found, near, sizeof(double) * (size_t)r->n_q);
+    for (int32_t i = 0; i < r->n_q && k > 0; i++) {
+        const double before = posture(r, k - 1)[i];
+        r->found[i] = isnan(before) ? near[i] : before;
+    }
+    const mhe_status status = (isfinite(r->nearest) ? mhi_start_posture : mhi_start_search)(
+        r->start, markers, r->found, &distance, NULL);
+    /* a frame that no posture comes near, where others fit, was not measured well */
+    if (status == MHE_OK && !isnan(distance) && !(outlier > 0 && distance > r->nearest + outlier)) {
+        r->nearest = fmin(r->nearest, distance);
+        memcpy(posture(r, k), r->found, sizeof(double) * (size_t)r->n_q);
     }
 }
 
 void mhi_rates_take(mhi_rates *r, int32_t k, const double *times, const double *markers,
-                    const double *near, double outlier, mhi_channel *c) {
+                    const double *angles, const double *near, double outlier, mhi_channel *c) {
     if (r->start == NULL) {
         return;
     }
-    const int32_t known = k > 0 && !isnan(posture(r, k - 1)[0]);
-    double distance = NAN;
-    memcpy(r->found, known ? posture(r, k - 1) : near, sizeof(double) * (size_t)r->n_q);
-    const mhe_status status = (isfinite(r->nearest) ? mhi_start_posture : mhi_start_search)(
-        r->start, markers, r->found, &distance, NULL);
     forget(r, k);
-    /* a frame that no posture comes near, where others fit, was not measured well */
-    if (status != MHE_OK || isnan(distance) || (outlier > 0 && distance > r->nearest + outlier)) {
-        return;
+    find_posture(r, k, markers, near, outlier);
+    for (int32_t i = 0; i < r->n_q && angles != NULL; i++) {
+        if (!isnan(angles[i])) {
+            posture(r, k)[i] = angles[i];
+        }
     }
-    r->nearest = fmin(r->nearest, distance);
-    memcpy(posture(r, k), r->found, sizeof(double) * (size_t)r->n_q);
     if (k > 0) {
         slope(r, k - 1, k, times);
-        put(c, k, r->v);
+        put(r, c, k);
     }
-    if (k > 1 && !isnan(posture(r, k - 2)[0])) {
+    if (k > 1) {
         slope(r, k - 2, k, times);
-        put(c, k - 1, r->v);
+        put(r, c, k - 1);
     }
 }

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* rates.h: joint velocities as the markers say: the posture of each node by inverse kinematics, and
- * its slopes to the nodes beside it.
+/* rates.h: joint velocities as the markers say, or the angles where these are measured: the posture
+ * of each node by inverse kinematics, and its slopes to the nodes beside it.
  *
  * Markers are compared at nodes only. What happens between two nodes, while controls are held, they
  * do not see: a light segment under strong muscles can swing there and be back in time, and where
@@ -13,7 +13,7 @@
 
 typedef struct mhi_rates {
     mhi_start *start; /* NULL: off */
-    double *q;        /* [nodes x n_q] postures; NaN where none is known */
+    double *q;        /* [nodes x n_q] postures; NaN where they are not known */
     double *found;    /* [n_q] */
     double *v;        /* [n_q] */
     double nearest;   /* m, the least distance that was left so far */
@@ -27,10 +27,10 @@ mhe_status mhi_rates_create(mhi_rates *rates, const mhi_run *run, const mhi_syst
 void mhi_rates_free(mhi_rates *rates);
 void mhi_rates_clear(mhi_rates *rates);
 void mhi_rates_shift(mhi_rates *rates);
-/* Node k [times: of all nodes] has come with `markers`: its posture, near to that of the node
- * before or else `near`, and by it the velocities of node k and of the one before, into `channel`.
- */
+/* Node k [times: of all nodes] has come with `markers` and `angles` (NULL: none): its posture, the
+ * angles where there are any, else near to that of the node before or `near`; and by it the
+ * velocities of node k and of the one before, into `channel`. */
 void mhi_rates_take(mhi_rates *rates, int32_t k, const double *times, const double *markers,
-                    const double *near, double outlier, mhi_channel *channel);
+                    const double *angles, const double *near, double outlier, mhi_channel *channel);
 
 #endif

@@ -3,21 +3,25 @@
 
 #include "base/arena.h"
 #include "base/cholesky.h"
+#include "base/pi.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MAX_ITERATIONS 60
 #define N_POSTURES 12 /* of the search */
+#define BETTER 0.99   /* of the distance: as near is not worth a posture elsewhere */
 
 struct mhi_start {
     const mhe_description *description;
     mhi_system_context *context;
     const mhi_tasks *tasks; /* NULL: none */
     int32_t n_q, n_k;
+    double enough;             /* rad or m: a step shorter than this ends the search */
     double *marker, *marker_q; /* [3 n_k], [3 n_k x n_q] */
     double *normal, *step;     /* [n_q x n_q], [n_q] */
     double *gradient, *trial, *best;
+    int32_t *moving; /* [n_q] scratch */
     mhi_arena arena;
 };
 
@@ -34,6 +38,7 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
     s->context = context;
     s->n_q = d->n_coordinates;
     s->n_k = d->n_markers;
+    s->enough = 1e-9;
     s->marker = MHI_TAKE(&arena, double, 3 * s->n_k);
     s->marker_q = MHI_TAKE(&arena, double, 3 * s->n_k * s->n_q);
     s->normal = MHI_TAKE(&arena, double, s->n_q * s->n_q);
@@ -41,9 +46,10 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
     s->gradient = MHI_TAKE(&arena, double, s->n_q);
     s->trial = MHI_TAKE(&arena, double, s->n_q);
     s->best = MHI_TAKE(&arena, double, s->n_q);
+    s->moving = MHI_TAKE(&arena, int32_t, s->n_q);
     s->arena = arena;
     if (!s->marker || !s->marker_q || !s->normal || !s->step || !s->gradient || !s->trial ||
-        !s->best) {
+        !s->best || !s->moving) {
         mhi_start_free(s);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
@@ -53,6 +59,10 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
 
 void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks) {
     start->tasks = tasks;
+}
+
+void mhi_start_set_enough(mhi_start *start, double step) {
+    start->enough = step;
 }
 
 void mhi_start_free(mhi_start *start) {
@@ -79,6 +89,24 @@ static void add_coordinates(mhi_start *s, const double *q, int linearise, sums *
     }
 }
 
+/* A residual r with its derivatives in the normal equations, of which the lower triangle is needed.
+ * Most coordinates do not move a marker. */
+static void add_row(mhi_start *s, const double *row, double weight, double r) {
+    int32_t n = 0;
+    for (int32_t i = 0; i < s->n_q; i++) {
+        s->moving[n] = i;
+        n += row[i] != 0;
+    }
+    for (int32_t i = 0; i < n; i++) {
+        const int32_t a = s->moving[i];
+        s->gradient[a] += weight * row[a] * r;
+        for (int32_t k = 0; k <= i; k++) {
+            const int32_t b = s->moving[k];
+            s->normal[a * s->n_q + b] += weight * row[a] * row[b];
+        }
+    }
+}
+
 /* Over the markers that are there; with the normal equations when `linearise` is set. */
 static mhe_status distances(mhi_start *s, const double *measured, const double *q, int linearise,
                             sums *sum, mhe_error *err) {
@@ -101,12 +129,8 @@ static mhe_status distances(mhi_start *s, const double *measured, const double *
         sum->weighted += weight * r * r;
         sum->plain += r * r;
         sum->n += 1;
-        const double *row = s->marker_q + i * s->n_q;
-        for (int32_t a = 0; a < s->n_q && linearise; a++) {
-            s->gradient[a] += weight * row[a] * r;
-            for (int32_t b = 0; b < s->n_q; b++) {
-                s->normal[a * s->n_q + b] += weight * row[a] * row[b];
-            }
+        if (linearise) {
+            add_row(s, s->marker_q + i * s->n_q, weight, r);
         }
     }
     add_coordinates(s, q, linearise, sum);
@@ -155,7 +179,7 @@ mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, do
             return status;
         }
         const double length = propose(s, q, damping);
-        if (length < 1e-9 || mhi_system_context_spent(s->context)) {
+        if (length < s->enough || mhi_system_context_spent(s->context)) {
             break;
         }
         status = distances(s, measured, s->trial, 0, &there, err);
@@ -191,13 +215,16 @@ mhe_status mhi_start_search(mhi_start *s, const double *measured, double *q, dou
          p++) {
         for (int32_t i = 0; i < s->n_q; i++) {
             const mhe_coordinate *c = &s->description->coordinates[i];
-            const double lower = isfinite(c->lower) ? c->lower : c->value - 1.5;
-            const double upper = isfinite(c->upper) ? c->upper : c->value + 1.5;
+            /* arms may turn around more than once, which looks the same */
+            const double lower =
+                isfinite(c->lower) ? fmax(c->lower, c->value - MHI_PI) : c->value - 1.5;
+            const double upper =
+                isfinite(c->upper) ? fmin(c->upper, c->value + MHI_PI) : c->value + 1.5;
             q[i] = lower + (upper - lower) * spread(p, i);
         }
         double found = 0;
         status = mhi_start_posture(s, measured, q, &found, err);
-        if (status == MHE_OK && found < best) {
+        if (status == MHE_OK && found < BETTER * best) {
             best = found;
             memcpy(s->best, q, bytes);
         }

@@ -12,6 +12,8 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
                             mhi_start **start, mhe_error *err);
 /* What single markers and coordinates count; NULL, as at first: all markers the same. Lent. */
 void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks);
+/* The step, rad or m, below which a posture is taken as found; at first 1e-9. */
+void mhi_start_set_enough(mhi_start *start, double step);
 void mhi_start_free(mhi_start *start);
 
 /* Least-squares posture q [n_q] within the coordinate ranges for markers [n_k x 3] (NaN: missing),

@@ -77,31 +77,21 @@ static mhe_status find_places(mhi_inspected *m, mhe_error *err) {
 }
 
 static mhe_status open_muscles(mhi_inspected *m, mhe_error *err) {
-    const mhe_plugin *plugin;
-    const void *config;
-    mhe_status status = m->all->n_muscles == 0
-                            ? MHE_OK
-                            : find(m, "muscle", MHE_MUSCLE_IFACE, "{}", &plugin, &config, err);
+    mhe_status status =
+        find(m, "muscle", MHE_MUSCLE_IFACE, "{}", &m->muscle_plugin, &m->muscle_config, err);
     if (status != MHE_OK || m->all->n_muscles == 0) {
-        return status;
+        return m->all->n_muscles == 0 ? MHE_OK : status;
     }
     m->layout.size = sizeof m->layout;
-    status = mhi_muscle_create(plugin, m->host, m->all->muscles, m->all->n_muscles, config,
-                               &m->muscles, &m->layout, err);
-    m->muscle = plugin->ops;
+    status = mhi_muscle_create(m->muscle_plugin, m->host, m->all->muscles, m->all->n_muscles,
+                               m->muscle_config, &m->muscles, &m->layout, err);
+    m->muscle = m->muscle_plugin->ops;
     return status;
 }
 
-mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char *file,
-                              int32_t paths, mhe_error *err) {
-    *m = (mhi_inspected){.host = mhi_host_or_silent(host)};
-    mhe_status status = mhi_model_read(file, &m->file, err);
-    if (status == MHE_OK) {
-        status = mhi_model_read_unlocked(file, &m->all, err);
-    }
-    if (status == MHE_OK) {
-        status = find_places(m, err);
-    }
+/* Of what was read. */
+static mhe_status open_read(mhi_inspected *m, int32_t paths, mhe_error *err) {
+    mhe_status status = find_places(m, err);
     if (status == MHE_OK) {
         status = mhi_registry_create(m->host, &m->registry, err);
     }
@@ -114,6 +104,26 @@ mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char
         status = mhi_skeleton_open(m, m->all, &m->skeleton, err);
     }
     return status != MHE_OK ? status : open_muscles(m, err);
+}
+
+mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char *file,
+                              int32_t paths, mhe_error *err) {
+    *m = (mhi_inspected){.host = mhi_host_or_silent(host)};
+    mhe_status status = mhi_model_read(file, &m->file, err);
+    if (status == MHE_OK) {
+        status = mhi_model_read_unlocked(file, &m->all, err);
+    }
+    return status == MHE_OK ? open_read(m, paths, err) : status;
+}
+
+mhe_status mhi_inspected_parse(mhi_inspected *m, const mhe_host *host, const char *name,
+                               const char *text, size_t length, int32_t paths, mhe_error *err) {
+    *m = (mhi_inspected){.host = mhi_host_or_silent(host)};
+    mhe_status status = mhi_osim_parse(name, text, length, &m->file, err);
+    if (status == MHE_OK) {
+        status = mhi_osim_parse_unlocked(name, text, length, &m->all, err);
+    }
+    return status == MHE_OK ? open_read(m, paths, err) : status;
 }
 
 void mhi_inspected_close(mhi_inspected *m) {

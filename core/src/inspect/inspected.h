@@ -30,6 +30,8 @@ typedef struct mhi_inspected {
     const void *model_config;
     mhi_skeleton skeleton; /* of all */
     const mhe_muscle_ops *muscle;
+    const mhe_plugin *muscle_plugin;
+    const void *muscle_config;
     void *muscles;
     mhe_muscle_layout layout;
 } mhi_inspected;
@@ -37,6 +39,9 @@ typedef struct mhi_inspected {
 /* Reads `file` and makes the instances; `paths`: MHE_PATHS_*. mhi_inspected_close() in any case. */
 mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char *file,
                               int32_t paths, mhe_error *err);
+/* The same of an .osim file in memory; `name` for messages. */
+mhe_status mhi_inspected_parse(mhi_inspected *m, const mhe_host *host, const char *name,
+                               const char *text, size_t length, int32_t paths, mhe_error *err);
 void mhi_inspected_close(mhi_inspected *m);
 mhe_status mhi_skeleton_open(const mhi_inspected *m, const mhe_description *description,
                              mhi_skeleton *skeleton, mhe_error *err);

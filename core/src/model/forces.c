@@ -273,9 +273,10 @@ static mhe_status add_one(mhi_system_context *c, const mhi_force *f, const doubl
     for (int32_t i = 0; i < l->n_paths; i++) {
         mhi_path_moments(c, l->paths[i], l->paths[i] + 1, &c->tension[i], c->other);
         if (derivatives) {
-            mhi_path_moment_derivatives(c, l->paths[i], c->tension[i], c->tension_l[i],
-                                        c->tension_w[i], c->row_q, c->row_v, c->other_q,
-                                        c->other_v);
+            const mhi_path_forces one = {c->tension + i, c->tension_l + i, c->tension_w + i,
+                                         c->row_q,       c->row_v,         c->other_q,
+                                         c->other_v};
+            mhi_path_moment_derivatives(c, l->paths[i], l->paths[i] + 1, &one);
         }
     }
     mhe_status status = MHE_OK;

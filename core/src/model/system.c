@@ -72,11 +72,9 @@ static void muscle_derivatives(mhi_system_context *c) {
     const int32_t n_q = s->face.n_q, n_m = s->face.n_m;
     memset(c->moment_q, 0, doubles(n_q * n_q));
     memset(c->moment_v, 0, doubles(n_q * n_q));
-    for (int32_t m = 0; m < n_m; m++) {
-        mhi_path_moment_derivatives(c, m, c->force[m], c->force_l[m], c->force_w[m],
-                                    c->force_q + m * n_q, c->force_v + m * n_q, c->moment_q,
-                                    c->moment_v);
-    }
+    const mhi_path_forces forces = {c->force,   c->force_l,  c->force_w, c->force_q,
+                                    c->force_v, c->moment_q, c->moment_v};
+    mhi_path_moment_derivatives(c, 0, n_m, &forces);
     if (s->n_parameters > 0) {
         mhi_parameters_forces(c);
     }
@@ -177,28 +175,10 @@ static void copy_solved(const mhi_system_context *c, int32_t block, double *out)
     }
 }
 
-/* out [n_q x n] = -M^-1 L_q^T diag(by), column k that of the muscle `muscle[k]`, NULL: k. A muscle
- * pulls at its own coordinates only. */
 static void acceleration_by_force(mhi_system_context *c, const double *by, const int32_t *muscle,
                                   int32_t n, double *out) {
-    const mhi_system *s = c->system;
-    const int32_t n_q = s->face.n_q;
-    const double *inverse = c->solved + 2 * n_q;
-    double *column = c->row_q;
-    for (int32_t k = 0; k < n; k++) {
-        const int32_t m = muscle == NULL ? k : muscle[k];
-        memset(column, 0, doubles(n_q));
-        for (int32_t j = s->first[m]; j < s->end[m]; j++) {
-            const double pull = -c->length_q[m * n_q + j] * by[k];
-            const double *row = inverse + j * 3 * n_q; /* symmetric */
-            for (int32_t i = 0; i < n_q && pull != 0; i++) {
-                column[i] += pull * row[i];
-            }
-        }
-        for (int32_t i = 0; i < n_q; i++) {
-            out[i * n + k] = column[i];
-        }
-    }
+    const int32_t n_q = c->system->face.n_q;
+    mhi_path_accelerations(c, c->solved + 2 * n_q, 3 * n_q, by, muscle, n, out);
 }
 
 static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acceleration *out,
@@ -388,6 +368,12 @@ mhe_status mhi_system_markers(mhi_system_context *c, const double *q, double *ma
     if (c->work != NULL) { /* bounded by itself: never refused */
         (void)mhi_work_count(c->work, marker_q != NULL ? 4 : 2, &c->loan);
     }
+    return c->system->model->kinematics(c->model, q, c->zero, &out, err);
+}
+
+mhe_status mhi_system_bodies(mhi_system_context *c, const double *q, double *body, double *body_q,
+                             mhe_error *err) {
+    const mhe_kinematics out = {.size = sizeof out, .body = body, .body_q = body_q};
     return c->system->model->kinematics(c->model, q, c->zero, &out, err);
 }
 

@@ -119,6 +119,21 @@ typedef struct mhi_muscle_state {
 mhe_status mhi_system_muscles(mhi_system_context *context, const mhe_system_point *at,
                               int32_t derivatives, mhi_muscle_state *out, mhe_error *err);
 
+/* The same muscles with other numbers: max_isometric_force times `force`, optimal_fiber_length
+ * times `fiber`, tendon_slack_length times `tendon` plus `path` (m). Rigid tendons only.
+ * MHE_E_INPUT: the muscle plugin refuses one. [cold] */
+typedef struct mhi_variation {
+    double force, fiber, tendon, path;
+} mhi_variation;
+typedef struct mhi_variant mhi_variant;
+mhe_status mhi_variant_create(const mhi_system *system, const mhi_variation *by,
+                              mhi_variant **variant, mhe_error *err);
+void mhi_variant_free(mhi_variant *variant);
+/* Forces [n_m] at the activations, lengths and velocities [n_m] of the system's own. [hot] */
+mhe_status mhi_variant_forces(const mhi_variant *variant, const double *activation,
+                              const double *length, const double *velocity, double *force,
+                              mhe_error *err);
+
 /* Muscle states in equilibrium with activations [n_m] at (q, v): d and z of a state x [n_x], the
  * rest of which is not touched. [cold] */
 mhe_status mhi_system_equilibrium(mhi_system_context *context, const double *q, const double *v,
@@ -145,6 +160,11 @@ mhe_status mhi_system_close_loops(mhi_system_context *context, double *q, double
 /* What keeps them closed [n_c], N (N m), ground axes, on body 2: of the context's last
  * acceleration. NULL: no loops. */
 const double *mhi_system_loop_force(const mhi_system_context *context);
+
+/* Bodies [n_b x 12] and, if not NULL, their velocities by the coordinates' [n_b x 6 x n_q], as in
+ * mhe/model.h. [hot] */
+mhe_status mhi_system_bodies(mhi_system_context *context, const double *q, double *body,
+                             double *body_q, mhe_error *err);
 
 /* General bounds of all entries of a role, one behind the other. */
 void mhi_layout_bounds(const mhe_layout *layout, int32_t role, double *lower, double *upper);

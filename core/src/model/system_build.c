@@ -73,6 +73,16 @@ static mhe_status check_muscle_layout(const mhi_system *s, const char *id, mhe_e
                : MHE_OK;
 }
 
+/* Makes a stretch of coordinates one of whole fours where the model has so many: its loops take
+ * four side by side (paths.c). */
+static void widen(int32_t n_q, int32_t *first, int32_t *end) {
+    const int32_t wide = (*end - *first + 3) / 4 * 4;
+    if (wide > 0 && wide <= n_q) {
+        *first = *first < n_q - wide ? *first : n_q - wide;
+        *end = *first + wide;
+    }
+}
+
 /* The range of coordinates that each path sees, outside of which its derivatives are 0. */
 static mhe_status find_ranges(mhi_system *s, mhe_error *err) {
     const int32_t n_q = s->description->n_coordinates, n_p = s->n_paths;
@@ -96,6 +106,7 @@ static mhe_status find_ranges(mhi_system *s, mhe_error *err) {
                 s->end[m] = j + 1;
             }
         }
+        widen(n_q, &s->first[m], &s->end[m]);
     }
     return status;
 }

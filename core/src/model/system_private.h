@@ -113,11 +113,18 @@ void mhi_path_velocities(mhi_system_context *c, int32_t from, int32_t to, const 
 /* Pulls along the same paths, force [to - from]: adds -L_q^T F to `moment`. */
 void mhi_path_moments(const mhi_system_context *c, int32_t from, int32_t to, const double *force,
                       double *moment);
-/* What dF/dL and dF/dLdot of one pull make of moment_q and moment_v; force_q, force_v [n_q] are its
- * own derivatives. */
-void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t path, double force,
-                                 double force_l, double force_w, double *force_q, double *force_v,
-                                 double *moment_q, double *moment_v);
+/* What dF/dL and dF/dLdot of the pulls [to - from] make of moment_q and moment_v [n_q x n_q];
+ * force_q, force_v [to - from x n_q] are the pulls' own derivatives. */
+typedef struct mhi_path_forces {
+    const double *force, *force_l, *force_w;
+    double *force_q, *force_v, *moment_q, *moment_v;
+} mhi_path_forces;
+void mhi_path_moment_derivatives(const mhi_system_context *c, int32_t from, int32_t to,
+                                 const mhi_path_forces *forces);
+/* out [n_q x n] = -M^-1 L_q^T diag(by): column k is the pull along path muscle[k] (NULL: k); M^-1
+ * [n_q x n_q] in rows of ld. */
+void mhi_path_accelerations(const mhi_system_context *c, const double *inverse, int32_t ld,
+                            const double *by, const int32_t *muscle, int32_t n, double *out);
 
 /* actuators.c: generalised force of the description's actuators at controls r [n_actuators], into
  * c->drive, with derivatives drive_q, drive_r. */

@@ -90,10 +90,15 @@ mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double
                         const double *x, const double *u, const mhe_stage_values *out,
                         mhe_error *err) {
     const int carries = ocp->signals.n_carried > 0;
+    const int32_t n_p = mhi_system_face(ocp->system)->n_p;
     const mhe_step_derivatives d = {sizeof d, carries && out->A != NULL ? w->A : out->A,
-                                    carries && out->B != NULL ? w->B : out->B, out->P};
+                                    carries && out->B != NULL ? w->B : out->B,
+                                    out->P != NULL && n_p > 0 ? w->P : NULL};
     mhe_status status = ocp->integrator->step(w->integrator, x, u, mhi_ocp_inputs_at(ocp, k),
                                               ocp->interval, memory, out->x_next, &d, err);
+    if (status == MHE_OK && out->P != NULL) {
+        mhi_parameters_fold(&ocp->parameters, ocp->n_x, n_p, w->P, out->P);
+    }
     if (status == MHE_OK && carries) {
         if (out->A != NULL) {
             widen(ocp, w, out->A, out->B);

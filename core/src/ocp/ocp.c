@@ -92,16 +92,66 @@ static void spread(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
 
 static int wants_derivatives(const mhe_stage_values *out) {
     return out->grad_x != NULL || out->grad_u != NULL || out->hess_xx != NULL ||
-           out->hess_ux != NULL || out->hess_uu != NULL;
+           out->hess_ux != NULL || out->hess_uu != NULL || out->grad_p != NULL ||
+           out->hess_px != NULL || out->hess_pu != NULL || out->hess_pp != NULL;
 }
 
-static void add_prior(const mhi_ocp *ocp, const double *x, int32_t n_z, mhi_term_sum *sum) {
+static void add_prior(const mhi_ocp *ocp, const double *centre, const double *x, int32_t n_z,
+                      mhi_term_sum *sum) {
     for (int32_t i = 0; i < ocp->n_x; i++) {
-        const double weight = ocp->prior_weight[i], difference = x[i] - ocp->prior_centre[i];
+        const double weight = ocp->prior_weight[i], difference = x[i] - centre[i];
         sum->cost += 0.5 * weight * difference * difference;
         if (sum->gradient != NULL) {
             sum->gradient[i] += weight * difference;
             sum->hessian[i * n_z + i] += weight;
+        }
+    }
+}
+
+/* Room for what terms say of the parameters. */
+static void begin_parameters(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t n_z,
+                             int32_t derivatives, mhi_term_sum *sum) {
+    const size_t n_p = (size_t)ocp->face.n_p, bytes = sizeof(double) * n_p;
+    if (derivatives) {
+        sum->by_p = &w->by_p;
+        memset(w->by_p.gradient, 0, bytes);
+        memset(w->by_p.pz, 0, bytes * (size_t)n_z);
+        memset(w->by_p.pp, 0, bytes * n_p);
+    }
+}
+
+/* What is known of the parameters beforehand. */
+static void add_parameter_prior(const mhi_ocp *ocp, mhi_term_sum *sum) {
+    const int32_t n = ocp->estimated == NULL ? 0 : ocp->parameters.setup.n;
+    for (int32_t i = 0; i < n; i++) {
+        const mhi_parameter *p = &ocp->parameters.setup.list[i];
+        const double weight = 1 / (p->sd * p->sd), off = ocp->parameters.p[i] - p->mean;
+        sum->cost += 0.5 * weight * off * off;
+        if (sum->by_p != NULL) {
+            sum->by_p->gradient[i] += weight * off;
+            sum->by_p->pp[i * n + i] += weight;
+        }
+    }
+}
+
+static void spread_parameters(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
+                              const mhe_stage_values *out) {
+    const int32_t n_p = ocp->face.n_p, n_x = ocp->n_x, n_u = n_z - n_x;
+    const mhi_term_by_p *by = &w->by_p;
+    for (int32_t i = 0; i < n_p; i++) {
+        if (out->grad_p != NULL) {
+            out->grad_p[i] = by->gradient[i];
+        }
+        if (out->hess_px != NULL) {
+            memcpy(out->hess_px + i * n_x, by->pz + i * n_z, sizeof(double) * (size_t)n_x);
+        }
+        if (out->hess_pu != NULL && n_u > 0) {
+            memcpy(out->hess_pu + i * n_u, by->pz + i * n_z + n_x, sizeof(double) * (size_t)n_u);
+        }
+    }
+    for (int32_t i = 0; i < n_p && out->hess_pp != NULL; i++) {
+        for (int32_t j = 0; j <= i; j++) {
+            out->hess_pp[i * n_p + j] = out->hess_pp[j * n_p + i] = by->pp[i * n_p + j];
         }
     }
 }
@@ -119,6 +169,15 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     w->linearised = derivatives;
     mhi_ocp_read_carried(ocp, k, x, w->y);
     mhi_term_sum sum = {0};
+    if (ocp->estimated != NULL) {
+        status = mhi_parameters_measure(
+            &ocp->parameters, &ocp->signals, ocp->system, w->system, ocp->wanted, x, w->room, w->y,
+            derivatives ? w->jacobian : NULL, derivatives ? w->by : NULL, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+        begin_parameters(ocp, w, n_z, derivatives, &sum);
+    }
     if (derivatives) {
         sum.gradient = w->gradient;
         sum.hessian = w->hessian;
@@ -129,7 +188,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
                              .node = k,
                              .n_intervals = ocp->face.n_intervals,
                              .time = ocp->times[k]};
-    const double scale = u == NULL ? 1 : ocp->interval;
+    const double scale = ocp->node_weight > 0 ? ocp->node_weight : u == NULL ? 1 : ocp->interval;
     const double *targets = ocp->targets + (ptrdiff_t)k * ocp->signals.n_y;
     const double *before = k == 0 ? NULL : targets - ocp->signals.n_y;
     for (int32_t i = 0; i < ocp->n_terms && status == MHE_OK; i++) {
@@ -140,7 +199,11 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
         return status;
     }
     if (k == 0) {
-        add_prior(ocp, x, n_z, &sum);
+        add_prior(ocp, ocp->prior_centre, x, n_z, &sum);
+        add_parameter_prior(ocp, &sum);
+    }
+    if (k > 0 && ocp->prior_at != NULL && ocp->prior_at[k] != NULL) {
+        add_prior(ocp, ocp->prior_at[k], x, n_z, &sum);
     }
     if (derivatives && !mhi_all_finite(w->gradient, n_z)) {
         return mhe_fail(err, MHE_RETRY, "a derivative of the costs is not finite");
@@ -150,8 +213,40 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     }
     if (derivatives) {
         spread(ocp, w, n_z, out);
+        spread_parameters(ocp, w, n_z, out);
     }
     return MHE_OK;
+}
+
+/* The costs at a node at which a junction begins or goes on. */
+static mhe_status evaluate_junction(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k,
+                                    const double *x, const double *u, const mhe_stage_values *out,
+                                    mhe_error *err) {
+    const int32_t number = ocp->junction.place[k], n_x = ocp->n_x, n_p = ocp->face.n_p;
+    mhe_status status = MHE_OK;
+    mhe_stage_values own = *out;
+    own.grad_u = own.hess_ux = own.hess_uu = own.hess_pu = NULL;
+    if (number == 0) { /* the last node of a motion */
+        status = evaluate_cost(ocp, w, k, x, NULL, &own, err);
+    } else {
+        struct {
+            double *values;
+            int32_t n;
+        } zero[] = {{own.cost, 1},     {own.grad_x, n_x},        {own.hess_xx, n_x * n_x},
+                    {own.grad_p, n_p}, {own.hess_px, n_p * n_x}, {own.hess_pp, n_p * n_p}};
+        for (size_t i = 0; i < sizeof zero / sizeof zero[0]; i++) {
+            if (zero[i].values != NULL) {
+                memset(zero[i].values, 0, sizeof(double) * (size_t)zero[i].n);
+            }
+        }
+    }
+    if (status == MHE_OK) {
+        if (out->hess_pu != NULL) {
+            memset(out->hess_pu, 0, sizeof(double) * (size_t)(n_p * ocp->face.n_u));
+        }
+        mhi_junction_cost(&ocp->junction, number, u, out);
+    }
+    return status;
 }
 
 /* What the integrator keeps of interval k. */
@@ -181,10 +276,13 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker_ind
     }
     mhe_status status = MHE_OK;
     w->linearised = 0;
+    const int32_t joins = u != NULL && ocp->junction.place != NULL && ocp->junction.place[k] >= 0;
     if (out->cost != NULL || wants_derivatives(out)) {
-        status = evaluate_cost(ocp, w, k, x, u, out, err);
+        status = (joins ? evaluate_junction : evaluate_cost)(ocp, w, k, x, u, out, err);
     }
-    if (status == MHE_OK && u != NULL && out->x_next != NULL) {
+    if (status == MHE_OK && joins && out->x_next != NULL) {
+        mhi_junction_step(&ocp->junction, ocp->junction.place[k], x, u, ocp->face.n_p, out);
+    } else if (status == MHE_OK && u != NULL && out->x_next != NULL) {
         status = mhi_ocp_step(ocp, w, k, interval_memory(ocp, k), x, u, out, err);
     }
     mhi_system_context_settle(w->system);
@@ -262,6 +360,22 @@ double *mhi_ocp_target_spread(mhi_ocp *ocp, int32_t signal) {
     return s->n_y == 0 ? NULL : ocp->spread + s->offset;
 }
 
+const mhi_parameters *mhi_ocp_parameters(const mhi_ocp *ocp) {
+    return ocp->estimated == NULL ? NULL : &ocp->parameters;
+}
+
+void mhi_ocp_set_parameter_bounds(mhi_ocp *ocp, const double *lower, const double *upper) {
+    const size_t bytes = sizeof(double) * (size_t)ocp->face.n_p;
+    memcpy(ocp->parameters.lower, lower, bytes);
+    memcpy(ocp->parameters.upper, upper, bytes);
+}
+
+mhe_status mhi_ocp_set_parameters(const mhe_stage_problem *problem, const double *p,
+                                  mhe_error *err) {
+    mhi_ocp *ocp = problem->data;
+    return mhi_parameters_set(&ocp->parameters, ocp->estimated, p, err);
+}
+
 void mhi_ocp_set_interval(mhi_ocp *ocp, double interval) {
     ocp->interval = interval;
     ocp->problem.interval = interval;
@@ -290,6 +404,15 @@ void mhi_ocp_forget(mhi_ocp *ocp) {
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight) {
     memcpy(ocp->prior_centre, centre, sizeof(double) * (size_t)ocp->face.n_x);
     memcpy(ocp->prior_weight, weight, sizeof(double) * (size_t)ocp->face.n_x);
+}
+
+void mhi_ocp_set_prior_at(mhi_ocp *ocp, int32_t k, const double *centre, const double *weight) {
+    if (k == 0 || ocp->prior_at == NULL) {
+        mhi_ocp_set_prior(ocp, centre, weight);
+    } else {
+        ocp->prior_at[k] = centre;
+        memcpy(ocp->prior_weight, weight, sizeof(double) * (size_t)ocp->n_x);
+    }
 }
 
 void mhi_ocp_set_stop(mhi_ocp *ocp, const atomic_int *stop) {
@@ -326,6 +449,20 @@ mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const dou
         ocp->integrator->step(ocp->workers[0].integrator, x, u, mhi_ocp_inputs_at(ocp, k),
                               ocp->interval, interval_memory(ocp, k), x_next, &d, err);
     mhi_system_context_settle(ocp->workers[0].system);
+    return status;
+}
+
+mhe_status mhi_ocp_expand(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                          const mhe_stage_values *out, mhe_error *err) {
+    mhi_ocp_worker *w = &ocp->workers[0];
+    mhi_system_context_settle(w->system);
+    mhi_system_context_set_work(w->system, NULL);
+    w->linearised = 0;
+    mhe_status status = evaluate_cost(ocp, w, k, x, u, out, err);
+    if (status == MHE_OK) {
+        status = mhi_ocp_step(ocp, w, k, NULL, x, u, out, err);
+    }
+    mhi_system_context_set_work(w->system, &ocp->work);
     return status;
 }
 

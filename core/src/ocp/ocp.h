@@ -10,6 +10,7 @@
 #ifndef MHI_OCP_H
 #define MHI_OCP_H
 
+#include "ocp/parameters.h"
 #include "ocp/term.h"
 
 #include <mhe/integrator.h>
@@ -27,6 +28,14 @@ typedef struct mhi_ocp_setup {
     int32_t n_intervals;
     double interval;   /* s */
     int32_t n_workers; /* threads that may evaluate at the same time, >= 1 */
+    /* For calibration; NULL and 0 else. What is estimated, and the system again, which they change;
+     * no term may then read forces, moments or the node before. Which interval of a junction
+     * (junction.h) each interval is [n_intervals], -1: of a motion. c_k of all nodes, as
+     * samples of noise count; 0: as above. */
+    const mhi_parameters_setup *parameters;
+    mhi_system *estimated;
+    const int32_t *junctions;
+    double node_weight;
 } mhi_ocp_setup;
 
 typedef struct mhi_ocp mhi_ocp;
@@ -63,6 +72,10 @@ double *mhi_ocp_target(mhi_ocp *ocp, int32_t signal, int32_t k);
 /* Standard deviation of a signal's targets over all that was measured [n_y of the signal], NaN (as
  * at the start): not known; told to costs. NULL where the problem has no such signal. */
 double *mhi_ocp_target_spread(mhi_ocp *ocp, int32_t signal);
+/* Bounds of the parameters for the next solve [n], within those of the setup. */
+void mhi_ocp_set_parameter_bounds(mhi_ocp *ocp, const double *lower, const double *upper);
+/* The parameters as they were set last; NULL where none are estimated. */
+const mhi_parameters *mhi_ocp_parameters(const mhi_ocp *ocp);
 /* Inputs of the system at node k [n_w], for what comes with the frames; those from files follow the
  * time. NaN at the start. */
 double *mhi_ocp_input(mhi_ocp *ocp, int32_t k);
@@ -84,12 +97,20 @@ mhi_work *mhi_ocp_work(mhi_ocp *ocp);
  * the start): none. */
 void mhi_ocp_set_prior(mhi_ocp *ocp, const double *centre, const double *weight);
 
+/* The same at another node k, the first of a motion, with a centre of its own [n_x] and these
+ * weights; `centre` lent. */
+void mhi_ocp_set_prior_at(mhi_ocp *ocp, int32_t k, const double *centre, const double *weight);
+
 /* x_next = F(x, u) over interval k by worker 0. */
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                            double *x_next, mhe_error *err);
 /* The same of interval k with A [n_x x n_x] and B [n_x x n_u], of the system alone. */
 mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                              double *x_next, double *A, double *B, mhe_error *err);
+/* What a solver's evaluate() gives at node k, by worker 0, without a trace: nothing is kept for
+ * later calls, and no work is counted. */
+mhe_status mhi_ocp_expand(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
+                          const mhe_stage_values *out, mhe_error *err);
 /* The system context of worker 0, for kinematics outside a solve. */
 mhi_system_context *mhi_ocp_context(mhi_ocp *ocp);
 

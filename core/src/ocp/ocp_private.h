@@ -4,6 +4,7 @@
 #ifndef MHI_OCP_PRIVATE_H
 #define MHI_OCP_PRIVATE_H
 
+#include "ocp/junction.h"
 #include "ocp/ocp.h"
 
 /* Memory of one thread. */
@@ -14,6 +15,10 @@ typedef struct mhi_ocp_worker {
     double *y, *jacobian;       /* of all signals */
     double *gradient, *hessian; /* [n_z], [n_z x n_z]; z = [x; u; m], see signals.h */
     double *A, *B;              /* of the system alone, where something is carried; else NULL */
+    double *P;                  /* [n_x x n_p of the system], where parameters are estimated */
+    double *room;               /* of mhi_parameters_measure */
+    mhi_by_parameter *by;       /* [n_y] */
+    mhi_term_by_p by_p;         /* its sums */
     int32_t linearised;         /* y and jacobian are those of the node and point in work */
 } mhi_ocp_worker;
 
@@ -42,10 +47,15 @@ struct mhi_ocp {
     int32_t n_w;
     int32_t *reach; /* [n_z] first column that a row of the Hessian's lower triangle can have */
     double *prior_centre, *prior_weight; /* [n_x] */
+    const double **prior_at;             /* [N+1] centres at other nodes; NULL: none has one */
     const char *const *entry_names[MHI_N_SIGNALS];
     double *memory;                    /* [N x memory_size] a ring, see interval_memory() */
     int32_t memory_size, first_memory; /* of the integrator, one interval; place of interval 0 */
     mhi_ocp_worker *workers;
+    mhi_system *estimated; /* that of the parameters; NULL: none are estimated */
+    mhi_parameters parameters;
+    mhi_junction junction; /* place NULL: one motion */
+    double node_weight;    /* c_k; 0: by time */
     mhi_arena arena;
 };
 
@@ -56,6 +66,9 @@ int32_t mhi_ocp_find_signal(const mhe_problem *problem, const char *name, int32_
 mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker, int32_t k,
                             const double *x, const double *u, const mhe_stage_values *out,
                             mhe_error *err);
+
+mhe_status mhi_ocp_set_parameters(const mhe_stage_problem *problem, const double *p,
+                                  mhe_error *err);
 
 /* carry.c. Gradient and Hessian as the solver wants them; values of the node before at node k from
  * its state, NaN where there is none; x_next, A and B of an interval with all that is carried. */

@@ -219,6 +219,24 @@ static void add_row(const double *row, int32_t first, int32_t n, double r, doubl
     }
 }
 
+/* A residual's share in what concerns parameters: d of its entry's dy/dp, `row` [n] from column
+ * `first` on of its dy/dz. */
+static void add_by_p(const mhi_by_parameter *by, double d, double r, double scale,
+                     const double *row, int32_t first, int32_t n, int32_t n_z, mhi_term_by_p *sum) {
+    for (int32_t a = 0; a < by->n; a++) {
+        const double of_p = scale * d * by->by[a];
+        sum->gradient[by->at[a]] += of_p * r;
+        for (int32_t b = 0; b < by->n; b++) {
+            if (by->at[b] <= by->at[a]) {
+                sum->pp[by->at[a] * sum->n_p + by->at[b]] += of_p * d * by->by[b];
+            }
+        }
+        for (int32_t c = 0; c < n; c++) {
+            sum->pz[by->at[a] * n_z + first + c] += of_p * d * row[c];
+        }
+    }
+}
+
 /* r_i depends on y_i alone: the row is the signal's own row times a number. */
 static void add_diagonal(const mhi_term *t, mhi_term_workspace *w, const mhi_signals *signals,
                          const double *jacobian, double scale, int32_t n_z, mhi_term_sum *sum) {
@@ -229,13 +247,21 @@ static void add_diagonal(const mhi_term *t, mhi_term_workspace *w, const mhi_sig
             continue;
         }
         const int32_t i = t->y_index[j] - s->offset;
+        const mhi_by_parameter *by = sum->by_p == NULL ? NULL : &sum->by_p->by[t->y_index[j]];
         if (s->n_columns == 0) {
             const int32_t c = s->column + i;
-            sum->gradient[c] += scale * d * r;
-            sum->hessian[c * n_z + c] += scale * d * d;
+            const double slope = by == NULL ? 1 : by->slope, to_z = d * slope;
+            sum->gradient[c] += scale * to_z * r;
+            sum->hessian[c * n_z + c] += scale * to_z * to_z;
+            if (by != NULL) {
+                add_by_p(by, d, r, scale, &slope, c, 1, n_z, sum->by_p);
+            }
         } else {
             const double *block = jacobian + s->jacobian + i * s->n_columns;
             add_row(block, s->column, s->n_columns, r / d, scale * d * d, n_z, sum);
+            if (by != NULL) {
+                add_by_p(by, d, r, scale, block, s->column, s->n_columns, n_z, sum->by_p);
+            }
         }
     }
 }

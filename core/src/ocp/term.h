@@ -5,6 +5,7 @@
 #define MHI_TERM_H
 
 #include "base/arena.h"
+#include "ocp/parameters.h"
 #include "ocp/signals.h"
 #include "ocp/tasks.h"
 
@@ -51,12 +52,23 @@ typedef struct mhi_term_workspace {
     void *scratch;
 } mhi_term_workspace;
 
+/* What a cost says of the parameters, where there are some: the signals' own dependence on them
+ * [n_y] and where the sums go. */
+typedef struct mhi_term_by_p {
+    const mhi_by_parameter *by;
+    int32_t n_p;
+    double *gradient; /* [n_p] */
+    double *pz;       /* [n_p x n_z] */
+    double *pp;       /* [n_p x n_p], lower triangle */
+} mhi_term_by_p;
+
 /* Where a term adds its share; derivatives all or none NULL. Row-major; z is what signals.h says,
  * at the last node without u where nothing is carried. */
 typedef struct mhi_term_sum {
     double cost;
-    double *gradient; /* [n_z] */
-    double *hessian;  /* [n_z x n_z], lower triangle only */
+    double *gradient;    /* [n_z] */
+    double *hessian;     /* [n_z x n_z], lower triangle only */
+    mhi_term_by_p *by_p; /* NULL: nothing is estimated */
 } mhi_term_sum;
 
 /* Creates the plugin's instance and lays it out. `problem` and `signals` must outlive the term.

@@ -245,6 +245,76 @@ static void test_presets(void **state) {
     assert_true(off[1] < off[2] && off[2] < 0.05);
 }
 
+/* A joint that one muscle and a torque of its own turn; the torque is counted in `unit` of N m. */
+static double unit;
+
+static void joint_rate(const toy *t, const double *x, const double *u, double *f, double *fx,
+                       double *fu) {
+    const double curve = exp(-x[0] * x[0]);
+    (void)t;
+    f[0] = x[1];
+    f[1] = 60 * curve * u[0] + 2 * unit * u[1] - 30 * sin(x[0]) - x[1];
+    fx[1] = 1;
+    fx[2] = -120 * x[0] * curve * u[0] - 30 * cos(x[0]);
+    fx[3] = -1;
+    fu[2] = 60 * curve;
+    fu[3] = 2 * unit;
+}
+
+static void joint_residual(const toy *t, int k, const double *x, const double *u, double *r,
+                           double *w, double *rx, double *ru) {
+    r[0] = x[0] - t->target[k];
+    w[0] = 1 / (0.001 * 0.001);
+    rx[0] = 1;
+    if (u != NULL) {
+        r[1] = u[0];
+        w[1] = 1 / (0.3 * 0.3);
+        ru[2] = 1;
+        r[2] = u[1];
+        w[2] = unit * unit / (10 * 10);
+        ru[5] = 1;
+    }
+}
+
+/* Whether a window settled does not depend on the unit of a torque beside activations. */
+static void test_units_of_torques(void **state) {
+    (void)state;
+    static const char *const yaml[] = {"{preset: balanced, objective_scale: 1, settled: 0.05}",
+                                       "{preset: balanced, objective_scale: 1, settled: 1e-9}"};
+    const double units[] = {1, 1e-3};
+    double target[8 + 1 + 6];
+    int32_t outcome[2][2][6];
+    for (int k = 0; k < 15; k++) {
+        target[k] = 0.6 * sin(0.7 * k);
+    }
+    for (int i = 0; i < 4; i++) {
+        toy t;
+        rig r;
+        unit = units[i / 2];
+        toy_init(&t, 8, 2, 2, 0.03, 2, joint_rate, joint_residual, 3, 1);
+        for (int k = 0; k < 8; k++) {
+            toy_u_lower(&t, k)[0] = 0;
+            toy_u_upper(&t, k)[0] = 1;
+            toy_u_lower(&t, k)[1] = -1000 / unit;
+            toy_u_upper(&t, k)[1] = 1000 / unit;
+        }
+        t.target = target;
+        assert_int_equal(rig_open(&r, &t, yaml[i % 2]), MHE_OK);
+        for (int window = 0; window < 6; window++) {
+            t.target = target + window;
+            assert_int_equal(rig_solve(&r, NULL), MHE_OK);
+            outcome[i / 2][i % 2][window] = r.info.outcome;
+            rig_shift(&r);
+        }
+        close_both(&r, &t);
+    }
+    assert_memory_equal(outcome[0], outcome[1], sizeof outcome[0]);
+    for (int window = 1; window < 6; window++) { /* and it is not that nothing moved */
+        assert_int_equal(outcome[0][0][window], MHE_SOLVE_CONVERGED);
+        assert_int_equal(outcome[0][1][window], MHE_SOLVE_ITERATION_LIMIT);
+    }
+}
+
 #ifdef MHE_COUNT_ALLOCATIONS
 /* Bytes that a solver of the arm's size takes when it is created. */
 static double megabytes(int n_intervals) {
@@ -304,6 +374,7 @@ int main(void) {
         cmocka_unit_test(test_evaluation_gives_up),
         cmocka_unit_test(test_stops),
         cmocka_unit_test(test_presets),
+        cmocka_unit_test(test_units_of_torques),
 #ifdef MHE_COUNT_ALLOCATIONS
         cmocka_unit_test(test_memory),
         cmocka_unit_test(test_no_memory_taken),

@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe-calibrate: a person's parameters from recordings: a model file, a config that uses it, and
+ * what they are worth. */
+#include "calibrate/person.h"
+#include "console.h"
+#include "report.h"
+#include "words.h"
+
+#include <math.h>
+#include <mhe/outbox.h>
+#include <string.h>
+
+typedef struct arguments {
+    const char *config, *out;
+    words_list set, others;
+    int32_t mode, quiet;
+} arguments;
+
+#define AT(field) offsetof(arguments, field)
+
+static const words_command commands[] = {
+    {.name = "",
+     .operand = "CONFIG.yaml",
+     .what = "config file",
+     .help = "of mhe-run, with a section calibrate: what is estimated from which recordings",
+     .most = 1}};
+
+static const words_option options[] = {
+    {.name = "--out",
+     .value = "DIR",
+     .help = "folder of the results; ./out/<config's name>-calibrated unless given",
+     .kind = WORDS_TEXT,
+     .at = AT(out)},
+    {.name = "--set",
+     .value = "path.to.key=value",
+     .help = "replaces a key of the config; may be given often",
+     .kind = WORDS_LIST,
+     .at = AT(set)},
+    {.name = "--quiet", .help = "no progress", .kind = WORDS_FLAG, .at = AT(quiet), .low = 1}};
+
+static const words_program program = {
+    .name = "mhe-calibrate",
+    .summary = "Estimates parameters of a person from recordings.",
+    .usage = "  mhe-calibrate CONFIG.yaml --out DIR [--set path.to.key=value]... [--quiet]\n"
+             "  mhe-calibrate --version | --help\n",
+    .notes = "DIR gets calibrated.osim, calibrated.yaml (a config of mhe-run that uses it),\n"
+             "parameters.csv, calibration.json and report.html.\n\n"
+             "Exit status: 0 done; 2 the command line, the config or a recording is wrong; 1\n"
+             "anything else.\n",
+    .commands = commands,
+    .n_commands = 1,
+    .options = options,
+    .n_options = sizeof options / sizeof options[0],
+    .mode = AT(mode),
+    .operand = AT(config),
+    .others = AT(others)};
+
+static int32_t show(void *data, int32_t iteration, double objective, double kkt) {
+    const arguments *a = data;
+    if (!a->quiet) {
+        (void)fprintf(stderr, "iteration %d: objective %.6g, optimality %.2g\n", (int)iteration,
+                      objective, kkt);
+    }
+    return 0;
+}
+
+/* The config with the solver that section calibrate asks for: all of a motion at once needs no
+ * real-time iteration. */
+static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run **run,
+                           mhe_error *err) {
+    mhi_plan plan;
+    mhi_arena arena = {0};
+    const char **set = MHI_TAKE(&arena, const char *, a->set.n + 1);
+    mhe_status status = mhi_run_read(a->config, a->set.values, a->set.n, registry, run, err);
+    if (status == MHE_OK) {
+        status = mhi_plan_read(*run, &plan, err);
+    }
+    if (status == MHE_OK && set == NULL) {
+        status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    if (status == MHE_OK) {
+        for (int32_t i = 0; i < a->set.n; i++) {
+            set[i] = a->set.values[i];
+        }
+        set[a->set.n] = mhi_arena_format(
+            &arena, "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %.17g}",
+            plan.solver == 0 ? "rti" : "ipopt", plan.solver == 0 ? "preset: robust, " : "",
+            (int)plan.max_iterations, plan.tolerance);
+        mhi_run_free(*run);
+        *run = NULL;
+        status = mhi_run_read(a->config, set, a->set.n + 1, registry, run, err);
+    }
+    mhi_arena_free(&arena);
+    return status;
+}
+
+static const char *file_of(const mhi_plan_recording *r) {
+    const char *path = r->markers != NULL ? r->markers : r->angles != NULL ? r->angles : r->emg;
+    const char *slash = path == NULL ? NULL : strrchr(path, '/');
+    return slash == NULL ? path : slash + 1;
+}
+
+/* Each recording with the config as it was and with that of the person. */
+static mhe_status compare(const arguments *a, const mhi_calibration *c, const char *person,
+                          report_recording *list, mhe_error *err) {
+    mhe_status status = MHE_OK;
+    for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
+        const mhi_plan_recording *r = &c->plan.recordings[i];
+        report_recording *one = &list[i];
+        *one = (report_recording){.name = file_of(r), .held_out = r->hold_out};
+        status = held_out_measure(a->config, r, c->host, &one->before, err);
+        if (status == MHE_OK) {
+            status = held_out_measure(person, r, c->host, &one->after, err);
+        }
+        if (status == MHE_OK && !a->quiet) {
+            (void)fprintf(
+                stderr, "%s%s: markers %.3g -> %.3g mm, EMG %.3g -> %.3g, forces %.3g -> %.3g N\n",
+                one->name, r->hold_out ? " (held out)" : "", 1e3 * one->before.marker,
+                1e3 * one->after.marker, one->before.emg, one->after.emg, one->before.force,
+                one->after.force);
+        }
+    }
+    return status;
+}
+
+static mhe_status write_text(mhe_outbox *box, const char *name, const mhi_text *text,
+                             mhe_error *err) {
+    return text->failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                        : mhe_outbox_text(box, name, text->data, err);
+}
+
+/* Model and config first: the comparison reads them. */
+static mhe_status write_person(const mhi_calibration *c, const char *out, mhe_error *err) {
+    mhi_text model = {0}, config = {0};
+    mhe_outbox *box = NULL;
+    mhe_status status = mhi_person_model(c, &model, err);
+    if (status == MHE_OK) {
+        status = mhi_person_config(c, "calibrated.osim", &config, err);
+    }
+    status = status == MHE_OK ? mhe_outbox_open(out, &box, err) : status;
+    status = status == MHE_OK ? write_text(box, "calibrated.osim", &model, err) : status;
+    status = status == MHE_OK ? write_text(box, "calibrated.yaml", &config, err) : status;
+    status = status == MHE_OK ? mhe_outbox_commit(box, err) : status;
+    mhe_outbox_close(box);
+    mhi_text_free(&model);
+    mhi_text_free(&config);
+    return status;
+}
+
+static mhe_status write_report(report_content *r, const char *out, mhe_error *err) {
+    mhi_text table = {0}, json = {0}, page = {0};
+    mhe_outbox *box = NULL;
+    report_findings(r);
+    report_table(r, &table);
+    report_json(r, &json);
+    report_html(r, &page);
+    mhe_status status = mhe_outbox_open(out, &box, err);
+    status = status == MHE_OK ? write_text(box, "parameters.csv", &table, err) : status;
+    status = status == MHE_OK ? write_text(box, "calibration.json", &json, err) : status;
+    status = status == MHE_OK ? write_text(box, "report.html", &page, err) : status;
+    status = status == MHE_OK ? mhe_outbox_commit(box, err) : status;
+    mhe_outbox_close(box);
+    mhi_text_free(&table);
+    mhi_text_free(&json);
+    mhi_text_free(&page);
+    return status;
+}
+
+/* Everything that follows from a solved calibration. */
+static mhe_status tell(arguments *a, mhi_calibration *c, mhe_error *err) {
+    mhi_text out = {0}, person = {0};
+    report_recording *recordings = MHI_TAKE(&c->arena, report_recording, c->plan.n_recordings);
+    report_content r = {c, recordings, c->plan.n_recordings, {0}};
+    mhi_text_add(&out, "%s%s%s", a->out != NULL ? a->out : "out/",
+                 a->out != NULL ? "" : c->run->name, a->out != NULL ? "" : "-calibrated");
+    mhi_text_add(&person, "%s/calibrated.yaml", out.failed ? "" : out.data);
+    mhe_status status = out.failed || person.failed || recordings == NULL
+                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                            : write_person(c, out.data, err);
+    if (status == MHE_OK) {
+        status = compare(a, c, person.data, recordings, err);
+    }
+    if (status == MHE_OK) {
+        status = write_report(&r, out.data, err);
+    }
+    if (status == MHE_OK && r.findings.length > 0 && !a->quiet) {
+        (void)fputs(r.findings.data, stderr);
+    }
+    if (status == MHE_OK) {
+        (void)printf("results in %s\n", out.data);
+    }
+    mhi_text_free(&r.findings);
+    mhi_text_free(&out);
+    mhi_text_free(&person);
+    return status;
+}
+
+static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *registry,
+                            mhe_error *err) {
+    mhi_run *run = NULL;
+    mhi_calibration c = {.progress = NULL};
+    mhe_status status = read_run(a, registry, &run, err);
+    if (status == MHE_OK) {
+        status = mhi_calibration_open(run, host, &c, err);
+        c.progress = show;
+        c.data = a;
+    }
+    if (status == MHE_OK) {
+        status = mhi_calibration_solve(&c, err);
+    }
+    if (status == MHE_OK) {
+        status = tell(a, &c, err);
+    }
+    mhi_calibration_close(&c);
+    mhi_run_free(run);
+    return status;
+}
+
+int main(int argc, char **argv) {
+    const mhe_host host = console_host("mhe-calibrate");
+    arguments a = {0};
+    mhe_error err = {0};
+    mhi_registry *registry = NULL;
+    int32_t command = 0, outcome = WORDS_RUN;
+    mhe_status status = words_parse(&program, argc, argv, &a, &command, &outcome, &err);
+    if (status == MHE_OK && outcome == WORDS_HELP) {
+        mhi_text text = {0};
+        words_help(&program);
+        mhi_plan_describe(&text);
+        status = console_print(&text, &err);
+    } else if (status == MHE_OK && outcome == WORDS_RUN) {
+        status = mhi_registry_create(&host, &registry, &err);
+        if (status == MHE_OK) {
+            status = calibrate(&a, &host, registry, &err);
+        }
+    }
+    mhi_registry_free(registry);
+    words_free(&program, &a);
+    return console_end("mhe-calibrate", status, &err);
+}

@@ -1,0 +1,432 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "calibrate/calibrate.h"
+#include "estimator/create.h"
+#include "io/model_file.h"
+#include "model/bounds.h"
+#include "ocp/junction.h"
+#include "plugin/instance.h"
+
+#include <math.h>
+#include <mhe/config.h>
+#include <string.h>
+#include <time.h>
+
+static double processor_seconds(void) {
+    struct timespec t;
+    (void)clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Where each recording stands in the chain of nodes. */
+static mhe_status lay_out(mhi_calibration *c, const mhi_system *system, mhe_error *err) {
+    mhi_junction junction;
+    mhe_status status = mhi_junction_create(system, NULL, &c->arena, &junction, err);
+    int32_t node = -1;
+    for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
+        mhi_motion *m = &c->motions[i];
+        if (!m->plan->hold_out) {
+            m->first = node < 0 ? 0 : node + junction.n;
+            node = m->first + m->n_nodes - 1;
+        }
+    }
+    c->n_intervals = node;
+    c->place = MHI_TAKE(&c->arena, int32_t, node);
+    if (status == MHE_OK && c->place == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t k = 0, past = 0; k < node && status == MHE_OK; k++) {
+        c->place[k] = past++;
+        for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+            const mhi_motion *m = &c->motions[i];
+            if (m->first >= 0 && k >= m->first && k < m->first + m->n_nodes - 1) {
+                c->place[k] = -1;
+                past = 0;
+            }
+        }
+    }
+    return status;
+}
+
+typedef struct problem {
+    mhi_system *system;
+    mhi_ocp *ocp;
+    const mhe_solver_ops *solver;
+    void *self;
+    mhe_solution s;
+} problem;
+
+static void close_problem(problem *p) {
+    if (p->self != NULL) {
+        p->solver->destroy(p->self);
+    }
+    mhi_ocp_free(p->ocp);
+    mhi_system_free(p->system);
+}
+
+static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
+    const mhi_run *run = c->run;
+    const char *names[3];
+    mhi_force_setup *forces = MHI_TAKE(&c->arena, mhi_force_setup, run->forces.n + 1);
+    if (forces == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    for (int32_t i = 0; i < run->forces.n; i++) {
+        forces[i] = (mhi_force_setup){run->forces.uses[i].plugin, run->forces.uses[i].config};
+    }
+    if (run->external_loads.plugin != NULL) {
+        return mhe_fail(err, MHE_E_UNSUPPORTED,
+                        "%s: data.external_loads: recordings with external loads cannot be "
+                        "calibrated from",
+                        run->path);
+    }
+    mhi_bounds bounds;
+    mhe_status status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
+    const mhi_system_setup setup = {.host = c->host,
+                                    .description = c->model,
+                                    .model = run->model.plugin,
+                                    .model_config = run->model.config,
+                                    .muscle = run->muscle.plugin,
+                                    .muscle_config = run->muscle.config,
+                                    .formulation = run->formulation,
+                                    .residual_torques = run->bounds.residual_torques,
+                                    .forces = forces,
+                                    .n_forces = run->forces.n,
+                                    .bounds = &bounds,
+                                    .parameters = names,
+                                    .n_parameters = 3};
+    for (int32_t i = 0; i < 3; i++) {
+        names[i] = mhi_plan_names[i];
+    }
+    return status == MHE_OK ? mhi_system_create(&setup, &p->system, err) : status;
+}
+
+static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
+    const mhi_run *run = c->run;
+    const mhi_recording *r = NULL;
+    mhi_term_setup *terms = MHI_TAKE(&c->arena, mhi_term_setup, run->n_costs);
+    for (int32_t i = 0; i < run->n_costs && terms != NULL; i++) {
+        const mhi_use *cost = &run->costs[i];
+        terms[i] =
+            (mhi_term_setup){cost->plugin, cost->config, cost->weight, cost->sigma, cost->huber};
+    }
+    for (int32_t i = 0; i < c->plan.n_recordings && r == NULL; i++) {
+        r = c->motions[i].first >= 0 ? c->motions[i].recording : NULL;
+    }
+    const double interval = run->horizon.ratio / r->rate;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        const mhi_motion *m = &c->motions[i];
+        if (m->first >= 0 && fabs(m->recording->rate / r->rate - 1) > 1e-3) {
+            return mhe_fail(err, MHE_E_INPUT,
+                            "%s: %g frames a second, other recordings have %g: all must be alike",
+                            m->run.data.markers, m->recording->rate, r->rate);
+        }
+    }
+    const mhi_ocp_setup setup = {.host = c->host,
+                                 .system = p->system,
+                                 .integrator = run->integrator.plugin,
+                                 .integrator_config = run->integrator.config,
+                                 .terms = terms,
+                                 .n_terms = run->n_costs,
+                                 .n_intervals = c->n_intervals,
+                                 .interval = interval,
+                                 .n_workers = run->realtime.threads,
+                                 .parameters = &c->setup,
+                                 .estimated = p->system,
+                                 .junctions = c->place,
+                                 .node_weight = fmin(1, interval / c->plan.noise_time)};
+    return terms == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                         : mhi_ocp_create(&setup, &p->ocp, err);
+}
+
+/* How much each channel varies over all recordings: what the costs take for the noise's measure. */
+static void set_spread(mhi_calibration *c, mhi_ocp *ocp) {
+    const int32_t control = mhi_ocp_control(ocp), n_m = c->model->n_muscles;
+    double *spread = mhi_ocp_target_spread(ocp, control);
+    for (int32_t i = 0; i < n_m; i++) {
+        double n = 0, sum = 0, squares = 0;
+        for (int32_t k = 0; k < c->n_intervals; k++) {
+            const double value = mhi_ocp_target(ocp, control, k)[i];
+            n += !isnan(value);
+            sum += isnan(value) ? 0 : value;
+            squares += isnan(value) ? 0 : value * value;
+        }
+        spread[i] = n > 0 ? sqrt(fmax(0, squares / n - sum * sum / (n * n))) : NAN;
+    }
+}
+
+/* Controls of a junction are the state that they lead to, within its bounds alone. */
+static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junction *junction) {
+    const int32_t n_x = junction->n_x, n_u = junction->n_u;
+    for (int32_t k = 0; k < c->n_intervals; k++) {
+        const int32_t number = c->place[k];
+        double *u = p->s.u + (ptrdiff_t)k * n_u;
+        if (number < 0) {
+            continue;
+        }
+        const double *first = p->s.x + (ptrdiff_t)(k - number + junction->n) * n_x;
+        for (int32_t i = 0; i < n_u; i++) {
+            u[i] = 0;
+            mhi_ocp_u_lower(p->ocp, k)[i] = -INFINITY;
+            mhi_ocp_u_upper(p->ocp, k)[i] = INFINITY;
+        }
+        for (int32_t i = 0; i < n_x; i++) {
+            const int32_t control = junction->control[number * n_x + i];
+            if (control >= 0) {
+                u[control] = first[i];
+            }
+        }
+        double *next = p->s.x + (ptrdiff_t)(k + 1) * n_x;
+        const mhe_stage_values out = {.size = sizeof out, .x_next = next};
+        mhi_junction_step(junction, number, p->s.x + (ptrdiff_t)k * n_x, u, 0, &out);
+        for (int32_t i = 0; i < n_x && number < junction->n - 1; i++) {
+            mhi_ocp_x_lower(p->ocp, k + 1)[i] = -INFINITY;
+            mhi_ocp_x_upper(p->ocp, k + 1)[i] = INFINITY;
+        }
+    }
+}
+
+#define FIRST_SD \
+    0.1 /* of a motion's first activations (fibres: 10 mm), about where they were found */
+
+/* Nothing tells the first activations of redundant muscles apart but what comes before: they stay
+ * near those of the start. */
+static mhe_status hold_beginnings(mhi_calibration *c, problem *p, mhe_error *err) {
+    const mhe_system *f = mhi_system_face(p->system);
+    double *weight = MHI_TAKE(&c->arena, double, f->n_x);
+    for (int32_t i = 2 * f->n_q; i < f->n_x && weight != NULL; i++) {
+        const double sd = i < 2 * f->n_q + f->n_d ? FIRST_SD : 0.01;
+        weight[i] = 1 / (sd * sd);
+    }
+    for (int32_t i = 0; i < c->plan.n_recordings && weight != NULL; i++) {
+        const mhi_motion *m = &c->motions[i];
+        double *centre = MHI_TAKE(&c->arena, double, f->n_x);
+        if (m->first < 0 || centre == NULL) {
+            continue;
+        }
+        memcpy(centre, p->s.x + (ptrdiff_t)m->first * f->n_x, sizeof *centre * (size_t)f->n_x);
+        mhi_ocp_set_prior_at(p->ocp, m->first, centre, weight);
+    }
+    return c->arena.failed || weight == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                             : MHE_OK;
+}
+
+static mhe_status take_solution(mhi_calibration *c, problem *p, mhe_error *err) {
+    const mhe_stage_problem *f = mhi_ocp_face(p->ocp);
+    const ptrdiff_t x = (ptrdiff_t)(f->n_intervals + 1) * f->n_x,
+                    u = (ptrdiff_t)f->n_intervals * f->n_u;
+    p->s = (mhe_solution){.size = sizeof p->s};
+    struct {
+        double **array;
+        ptrdiff_t n;
+    } wanted[] = {{&p->s.x, x},          {&p->s.u, u},        {&p->s.lambda, x},
+                  {&p->s.zx_lower, x},   {&p->s.zx_upper, x}, {&p->s.zu_lower, u},
+                  {&p->s.zu_upper, u},   {&p->s.p, c->n},     {&p->s.zp_lower, c->n},
+                  {&p->s.zp_upper, c->n}};
+    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
+        *wanted[i].array = MHI_TAKE(&c->arena, double, wanted[i].n);
+        if (*wanted[i].array == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+    }
+    return MHE_OK;
+}
+
+/* Targets, bounds and the start. */
+static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) {
+    const mhe_stage_problem *f = mhi_ocp_face(p->ocp);
+    const mhe_layout *layout = mhi_system_face(p->system)->layout;
+    mhi_junction junction;
+    mhe_status status = take_solution(c, p, err);
+    for (int32_t k = 0; k <= f->n_intervals && status == MHE_OK; k++) {
+        mhi_layout_bounds(layout, MHE_ROLE_STATE, mhi_ocp_x_lower(p->ocp, k),
+                          mhi_ocp_x_upper(p->ocp, k));
+        if (k < f->n_intervals) {
+            mhi_layout_bounds(layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(p->ocp, k),
+                              mhi_ocp_u_upper(p->ocp, k));
+        }
+    }
+    for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
+        const mhi_motion *m = &c->motions[i];
+        if (m->first >= 0) {
+            mhi_motion_targets(c, i, p->ocp);
+            status = mhi_motion_guess(c, i, f->n_x, f->n_u, p->s.x + (ptrdiff_t)m->first * f->n_x,
+                                      p->s.u + (ptrdiff_t)m->first * f->n_u, err);
+        }
+    }
+    if (status == MHE_OK) {
+        set_spread(c, p->ocp);
+        status = hold_beginnings(c, p, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_junction_create(p->system, c->place, &c->arena, &junction, err);
+    }
+    if (status == MHE_OK) {
+        start_junctions(c, p, &junction);
+    }
+    for (int32_t i = 0; i < c->n; i++) {
+        p->s.p[i] = c->setup.list[i].start;
+    }
+    return status;
+}
+
+/* What was found, and how well it is known. */
+static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
+    const mhe_covariance out = {.size = sizeof out, .node = 0, .pp = c->covariance};
+    mhe_status status =
+        p->solver->covariance == NULL ? MHE_OK : p->solver->covariance(p->self, &out, err);
+    for (int32_t i = 0; i < c->n && status == MHE_OK; i++) {
+        mhi_estimated *e = &c->list[i];
+        e->value = p->s.p[i] * e->unit;
+        const double margin = 1e-4 * (e->upper - e->lower);
+        e->at_bound = e->value < e->lower + margin || e->value > e->upper - margin;
+        e->sd = p->solver->covariance == NULL ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
+        e->informed = e->at_bound || !(e->sd > 0.95 * e->prior_sd);
+        if (e->at_bound) {
+            e->sd = 0;
+        }
+        for (int32_t j = 0; j < c->n; j++) {
+            c->covariance[i * c->n + j] *= e->unit * c->list[j].unit;
+        }
+    }
+    return status;
+}
+
+/* ---- the way to the solution ----
+ *
+ * Passive forces grow exponentially with lengths, so that the linearisation holds for small changes
+ * of the parameters only. They may change by a part of their standard deviation (a trust region),
+ * for a few iterations; then the region is moved, and made larger or smaller by how much was
+ * gained. */
+#define FIRST_RADIUS 0.3 /* standard deviations */
+#define LEAST_RADIUS 0.01
+#define MOST_RADIUS 4.0
+#define SHORT 2 /* iterations within a region */
+
+typedef struct counter {
+    mhi_calibration *c;
+    int32_t done, limit; /* iterations before this solve; of this solve, at most */
+} counter;
+
+static int32_t count(void *data, int32_t iteration, double objective, double kkt) {
+    const counter *n = data;
+    const mhi_calibration *c = n->c;
+    const int32_t stop = c->progress != NULL && iteration > 0 &&
+                         c->progress(c->data, n->done + iteration, objective, kkt);
+    return stop || iteration >= n->limit || n->done + iteration >= c->plan.max_iterations;
+}
+
+/* Bounds of the region about p; 1: p itself is at one that is no bound of the parameter's. */
+static void set_region(const mhi_calibration *c, problem *p, double radius, double *lower,
+                       double *upper) {
+    for (int32_t i = 0; i < c->n; i++) {
+        const mhi_parameter *one = &c->setup.list[i];
+        const double sd = fmin(one->sd, one->upper - one->lower);
+        lower[i] = fmax(one->lower, p->s.p[i] - radius * sd);
+        upper[i] = fmin(one->upper, p->s.p[i] + radius * sd);
+    }
+    mhi_ocp_set_parameter_bounds(p->ocp, lower, upper);
+}
+
+static int32_t is_held(const mhi_calibration *c, const problem *p, const double *lower,
+                       const double *upper) {
+    int32_t held = 0;
+    for (int32_t i = 0; i < c->n && !held; i++) {
+        const mhi_parameter *one = &c->setup.list[i];
+        const double margin = 1e-3 * (upper[i] - lower[i]), value = p->s.p[i];
+        held = (value < lower[i] + margin && lower[i] > one->lower) ||
+               (value > upper[i] - margin && upper[i] < one->upper);
+    }
+    return held;
+}
+
+static mhe_status find_solution(mhi_calibration *c, problem *p, mhe_error *err) {
+    counter n = {.c = c};
+    const mhe_solve_control control = {.size = sizeof control, .progress = count, .data = &n};
+    double *lower = MHI_TAKE(&c->arena, double, c->n), *upper = MHI_TAKE(&c->arena, double, c->n);
+    double radius = FIRST_RADIUS, before = INFINITY;
+    mhe_status status =
+        lower == NULL || upper == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    for (int32_t held = 1; status == MHE_OK && held && n.done < c->plan.max_iterations;) {
+        set_region(c, p, radius, lower, upper);
+        n.limit = SHORT;
+        c->info = (mhe_solve_info){.size = sizeof c->info};
+        status = p->solver->solve(p->self, &control, &p->s, &c->info, err);
+        n.done += c->info.iterations > 0 ? c->info.iterations : 1;
+        if (status != MHE_OK) {
+            break;
+        }
+        const double gain = before - c->info.objective;
+        held = is_held(c, p, lower, upper) || !(gain < 1e-3 * fabs(before));
+        radius = gain > 0.02 * fabs(before)   ? fmin(2 * radius, MOST_RADIUS)
+                 : gain < 1e-4 * fabs(before) ? 0.5 * radius
+                                              : radius;
+        held = held && radius >= LEAST_RADIUS;
+        before = c->info.objective;
+    }
+    if (status == MHE_OK) { /* without a region */
+        set_region(c, p, INFINITY, lower, upper);
+        n.limit = c->plan.max_iterations;
+        status = p->solver->solve(p->self, &control, &p->s, &c->info, err);
+        c->info.iterations += n.done;
+    }
+    if (status == MHE_OK && c->info.outcome == MHE_SOLVE_INTERRUPTED) {
+        c->info.outcome = MHE_SOLVE_ITERATION_LIMIT;
+    }
+    return status;
+}
+
+mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
+    problem p = {.solver = c->run->solver.plugin->ops};
+    mhe_status status = open_system(c, &p, err);
+    if (status == MHE_OK) {
+        status = lay_out(c, p.system, err);
+    }
+    if (status == MHE_OK) {
+        status = open_ocp(c, &p, err);
+    }
+    if (status == MHE_OK) {
+        status = start_problem(c, &p, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_solver_create(c->run->solver.plugin, c->host, mhi_ocp_face(p.ocp),
+                                   c->run->solver.config, &p.self, err);
+    }
+    if (status == MHE_OK) {
+        const double begin = processor_seconds();
+        status = find_solution(c, &p, err);
+        c->seconds = processor_seconds() - begin;
+    }
+    if (status == MHE_OK) {
+        status = take_result(c, &p, err);
+    }
+    close_problem(&p);
+    return status;
+}
+
+mhe_status mhi_calibration_open(mhi_run *run, const mhe_host *host, mhi_calibration *c,
+                                mhe_error *err) {
+    *c = (mhi_calibration){.run = run, .host = host};
+    mhe_status status = mhi_plan_read(run, &c->plan, err);
+    if (status == MHE_OK) {
+        status = mhi_estimator_read_model(run, host, &c->model, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_calibration_choose(c, err);
+    }
+    if (status == MHE_OK) {
+        c->motions = MHI_TAKE(&c->arena, mhi_motion, c->plan.n_recordings);
+        status = c->motions == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    }
+    for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
+        status = mhi_motion_read(c, i, err);
+    }
+    return status;
+}
+
+void mhi_calibration_close(mhi_calibration *c) {
+    for (int32_t i = 0; i < c->plan.n_recordings && c->motions != NULL; i++) {
+        mhi_recording_free(c->motions[i].recording);
+    }
+    mhi_description_free(c->model);
+    mhi_arena_free(&c->arena);
+}

@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bands_cause.c: how large the errors are that estimates rest on. */
+#include "estimator/bands_private.h"
+
+#include "base/cholesky.h"
+
+#include <string.h>
+
+#define MEMORY 500.0  /* frames that the level of EMG's noise is learnt over */
+#define PATIENCE 10.0 /* frames' worth of belief in what the config says of it */
+#define QUIET 0.02    /* channels that vary less than that tell little */
+#define UNKNOWN 0.1   /* variation of a channel that is not known yet */
+
+/* Next state by an error of a muscle's force that stays over the interval, in units of activation:
+ * as if activation and its control were that much larger together. */
+static void forces_of(const mhe_estimator *e, mhi_bands *b) {
+    const mhi_gain_node *here = &b->gain.here;
+    const mhe_block *activation =
+        mhe_layout_find(mhi_ocp_problem(e->ocp)->layout, MHE_ROLE_STATE, "activation");
+    for (int32_t i = 0; i < b->n_x; i++) {
+        for (int32_t m = 0; m < b->n_m; m++) {
+            const double of_state =
+                activation == NULL ? 0 : here->A[i * b->n_x + activation->first + m];
+            here->force[i * b->n_m + m] = i < 2 * b->n_q ? of_state + here->B[i * b->n_u + m] : 0;
+        }
+    }
+}
+
+/* J^T J of the markers seen at node k, into `normal` [n_q x n_q]. */
+static int32_t see_markers(mhe_estimator *e, mhi_bands *b, int32_t k, double *normal) {
+    const mhi_channel *c = mhi_channels_find(&e->channels, MHI_SIGNAL_MARKERS);
+    const int32_t n_q = b->n_q;
+    int32_t n = 0;
+    memset(normal, 0, sizeof(double) * (size_t)(n_q * n_q));
+    if (c == NULL || !c->read ||
+        mhi_system_markers(mhi_ocp_context(e->ocp), mhi_row(e->window.solution.x, k, b->n_x),
+                           b->marker, b->marker_q, NULL) != MHE_OK) {
+        return 0;
+    }
+    const double *seen = mhi_row(c->believed, k, c->face.width);
+    for (int32_t r = 0; r < 3 * e->n_k; r++) {
+        const double *row = b->marker_q + r * n_q;
+        n += !isnan(seen[r]);
+        for (int32_t i = 0; i < n_q && !isnan(seen[r]); i++) {
+            for (int32_t j = 0; j <= i; j++) {
+                normal[i * n_q + j] += row[i] * row[j];
+            }
+        }
+    }
+    return n;
+}
+
+/* Of independent errors of the markers, each of 1 m, the costs' gradient by q has the covariance
+ * w^2 J^T J, w being what a square metre weighs: its root's columns are the directions. */
+static void postures_of(mhe_estimator *e, mhi_bands *b, int32_t k) {
+    const int32_t n_q = b->n_q;
+    mhi_gain_node *here = &b->gain.here;
+    double *root = here->pose_fixed, weighed = 0, plain = 0;
+    const int32_t n = see_markers(e, b, k, root);
+    for (int32_t i = 0; i < n_q; i++) {
+        weighed += here->hess_xx[i * b->n_x + i];
+        plain += root[i * n_q + i];
+    }
+    for (int32_t i = 0; i < n_q; i++) { /* directions that no marker shows */
+        root[i * n_q + i] += 1e-9 * plain;
+    }
+    const int32_t known = n > 0 && plain > 0 && mhi_cholesky_factor(root, n_q) == 0;
+    const double weight = known ? weighed / plain : 0;
+    for (int32_t i = 0; i < n_q; i++) {
+        for (int32_t j = 0; j < n_q; j++) {
+            const double entry = j > i || !known ? 0
+                                 : j == i        ? 1 / root[i * n_q + i]
+                                                 : root[i * n_q + j];
+            here->pose_fresh[i * n_q + j] = weight * b->config->marker_noise * entry;
+            here->pose_fixed[i * n_q + j] = weight * b->config->marker_offset * entry;
+        }
+    }
+}
+
+/* Joint moments around node k. */
+static int32_t moments_of(mhe_estimator *e, mhi_bands *b, int32_t k) {
+    const int32_t n_q = b->n_q;
+    mhi_bands_moments *to = &b->moments[1];
+    mhi_muscle_state muscles;
+    mhe_system_point at;
+    mhi_system_point(e->system, mhi_row(e->window.solution.x, k, b->n_x),
+                     mhi_row(e->window.solution.u, k, b->n_u), NULL, &at);
+    if (mhi_system_muscles(mhi_ocp_context(e->ocp), &at, 1, &muscles, NULL) != MHE_OK) {
+        return 0;
+    }
+    memcpy(to->by_q, muscles.moment_q, sizeof(double) * (size_t)(n_q * n_q));
+    memcpy(to->by_v, muscles.moment_v, sizeof(double) * (size_t)(n_q * n_q));
+    for (int32_t j = 0; j < n_q; j++) {
+        for (int32_t m = 0; m < b->n_m; m++) {
+            to->by_a[j * b->n_m + m] = -muscles.length_q[m * n_q + j] * muscles.force_a[m];
+        }
+    }
+    return 1;
+}
+
+int32_t mhi_bands_expand(mhe_estimator *e, mhi_bands *b) {
+    const int32_t k = e->node > 0 && e->node < e->window.n ? e->node : 1;
+    mhi_gain_node *here = &b->gain.here;
+    double cost = 0;
+    const mhe_stage_values out = {.size = sizeof out,
+                                  .cost = &cost,
+                                  .grad_x = b->slope,
+                                  .grad_u = b->slope + b->n_x,
+                                  .hess_xx = here->hess_xx,
+                                  .hess_ux = here->hess_ux,
+                                  .hess_uu = here->hess_uu,
+                                  .x_next = b->value,
+                                  .A = here->A,
+                                  .B = here->B};
+    if (mhi_ocp_expand(e->ocp, k, mhi_row(e->window.solution.x, k, b->n_x),
+                       mhi_row(e->window.solution.u, k, b->n_u), &out, NULL) != MHE_OK) {
+        return 0;
+    }
+    b->gain.interval = mhi_ocp_problem(e->ocp)->interval;
+    forces_of(e, b);
+    postures_of(e, b, k);
+    for (int32_t m = 0; m < b->n_m; m++) { /* what holds a control is its EMG */
+        here->control[m] = -here->hess_uu[m * b->n_u + m];
+    }
+    return moments_of(e, b, k);
+}
+
+/* EMG of node k, where it is believed, NaN where not. */
+static const double *emg_of(const mhe_estimator *e, int32_t k) {
+    const mhi_channel *c = mhi_channels_find(&e->channels, mhi_ocp_control(e->ocp));
+    return c == NULL || !c->read ? NULL : mhi_row(c->believed, k, c->face.width);
+}
+
+static double variation_of(const double *spread, int32_t m) {
+    return spread == NULL || !(spread[m] > 0) ? UNKNOWN : spread[m];
+}
+
+static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
+    const mhi_uncertainty_section *c = b->config;
+    const double *emg = emg_of(e, k < e->window.n ? k : e->window.n - 1);
+    const double *spread = mhi_ocp_target_spread(e->ocp, mhi_ocp_control(e->ocp));
+    for (int32_t m = 0; m < b->n_m; m++) {
+        const int32_t known = emg != NULL && !isnan(emg[m]);
+        const double noise = b->emg.level * c->emg_noise * variation_of(spread, m);
+        const double gain = known ? c->emg_gain * emg[m] : 0;
+        const double all = known ? noise * noise + gain * gain + c->emg_floor * c->emg_floor
+                                 : c->control * c->control;
+        b->size[m] = sqrt(all);
+        b->noise_share[m] = known && all > 0 ? noise * noise / all : 0;
+    }
+}
+
+/* A muscle's force errors by its numbers, as one: they act through the force alone. */
+static void size_forces(mhe_estimator *e, mhi_bands *b, const double *activation,
+                        const mhi_muscle_state *muscles) {
+    double *size = b->size + b->n_m;
+    for (int32_t m = 0; m < b->n_m; m++) {
+        const double strength = b->config->max_isometric_force * muscles->force[m];
+        size[m] = strength * strength;
+    }
+    for (int32_t i = 0; i < MHI_N_VARIANTS; i += 2) {
+        memset(b->worst, 0, sizeof(double) * (size_t)b->n_m);
+        for (int32_t way = i; way < i + 2; way++) {
+            if (b->variants[way] == NULL ||
+                mhi_variant_forces(b->variants[way], activation, muscles->length, muscles->velocity,
+                                   b->force, NULL) != MHE_OK) {
+                continue;
+            }
+            for (int32_t m = 0; m < b->n_m; m++) {
+                const double d = fabs(b->force[m] - muscles->force[m]);
+                b->worst[m] = isfinite(d) ? fmax(d, b->worst[m]) : b->worst[m];
+            }
+        }
+        for (int32_t m = 0; m < b->n_m; m++) { /* of both ways the larger */
+            size[m] += b->worst[m] * b->worst[m];
+        }
+    }
+    for (int32_t m = 0; m < b->n_m; m++) {
+        const double least = 1e-3 * e->description->muscles[m].max_isometric_force;
+        const double slope = fmax(fabs(muscles->force_a[m]), least);
+        size[m] = sqrt(size[m]) / slope;
+    }
+}
+
+void mhi_bands_size(mhe_estimator *e, mhi_bands *b, int32_t k, const double *activation,
+                    const mhi_muscle_state *muscles) {
+    size_emg(e, b, k);
+    size_forces(e, b, activation, muscles);
+    for (int32_t i = b->gain.fixed; i < b->gain.n_columns; i++) {
+        b->size[i] = 1;
+    }
+}
+
+void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
+    const double *emg = emg_of(e, 0), *u = e->window.solution.u;
+    const double *spread = mhi_ocp_target_spread(e->ocp, mhi_ocp_control(e->ocp));
+    const double level = b->emg.level * b->emg.level;
+    double seen = 0, noise = 0, others = 0;
+    for (int32_t m = 0; m < b->n_m && emg != NULL; m++) {
+        const double *row = b->controls + (ptrdiff_t)m * b->gain.n_columns;
+        const double scale = variation_of(spread, m) + QUIET;
+        if (isnan(emg[m])) {
+            continue;
+        }
+        seen += (u[m] - emg[m]) * (u[m] - emg[m]) / (scale * scale);
+        for (int32_t i = 0; i < b->gain.n_columns; i++) {
+            const double error = row[i] - (i == m ? b->size[m] : 0);
+            const double square = error * error / (scale * scale);
+            const double share = i < b->n_m ? b->noise_share[i] : 0;
+            noise += share * square / level;
+            others += (1 - share) * square;
+        }
+    }
+    if (!(noise > 0) || !b->config->emg_measured) {
+        return;
+    }
+    mhi_emg_level *l = &b->emg;
+    const double keep = 1 - 1 / MEMORY;
+    l->seen = keep * l->seen + seen;
+    l->noise = keep * l->noise + noise;
+    l->others = keep * l->others + others;
+    l->frames++;
+    /* What the other causes may do says nothing of the noise: it holds on to level 1. */
+    const double held = PATIENCE * l->noise / l->frames + l->others;
+    l->level = sqrt((held + fmax(0, l->seen - l->others)) / (held + l->noise));
+}

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* bands_private.h: the parts of the bands: how large causes are (bands_cause.c), how they spread
+ * (bands.c). */
+#ifndef MHI_BANDS_PRIVATE_H
+#define MHI_BANDS_PRIVATE_H
+
+#include "estimator/bands.h"
+#include "estimator/estimator_private.h"
+#include "estimator/gain.h"
+
+#define MHI_N_VARIANTS 4 /* optimal fibre length, tendon slack length, each both ways */
+
+/* How large the noise of EMG is beside what the config says, by its residuals: sums that forget. */
+typedef struct mhi_emg_level {
+    double seen;    /* squares of residuals */
+    double noise;   /* what noise of level 1 would make of them */
+    double others;  /* what the other causes make of them */
+    double level;   /* of the noise, a factor */
+    int32_t frames; /* so far */
+} mhi_emg_level;
+
+/* Joint moments by activations [n_q x n_m], q and v [n_q x n_q]. */
+typedef struct mhi_bands_moments {
+    double *by_a, *by_q, *by_v;
+} mhi_bands_moments;
+
+struct mhi_bands {
+    mhi_bands_moments moments[2]; /* where the known answers were found; of the sweep in work */
+    const mhi_uncertainty_section *config;
+    mhi_gain gain;
+    mhi_variant *variants[MHI_N_VARIANTS]; /* NULL: that number is known */
+    int32_t n_x, n_u, n_q, n_m;
+    int32_t begun;                  /* `error` is that of this window */
+    double *error;                  /* [n_x x columns] of node 0 */
+    double *next;                   /* the same, of the next window's */
+    double *size;                   /* [columns] of each cause, in units of the gain's */
+    double *noise_share;            /* [n_m] of noise in the square of an EMG cause */
+    double *at;                     /* [n_x x columns] error of the output's node */
+    double *controls;               /* [n_u x columns] of node 0; then of the output's node */
+    double *row;                    /* [columns] */
+    double *marker_q;               /* [3 n_k x n_q] */
+    double *marker, *force, *worst; /* [3 n_k], [n_m], [n_m] scratch */
+    double *force_error;            /* [n_m x columns] */
+    double *q, *activation, *force_sd, *moment;
+    double *value, *slope; /* scratch of a node's expansion: [n_x], [n_x + n_u] */
+    mhi_emg_level emg;
+    mhi_arena arena;
+};
+
+/* The linearised node that the next sweep starts from. 0: it has no value there. */
+int32_t mhi_bands_expand(mhe_estimator *e, mhi_bands *b);
+/* Sizes of the causes at node k, where the muscles are as `muscles` says. */
+void mhi_bands_size(mhe_estimator *e, mhi_bands *b, int32_t k, const double *activation,
+                    const mhi_muscle_state *muscles);
+/* Learns the level of EMG's noise from node 0, whose controls' errors are b->controls. */
+void mhi_bands_learn(mhe_estimator *e, mhi_bands *b);
+
+#endif
