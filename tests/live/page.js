@@ -142,8 +142,13 @@ setTimeout(() => fail("not done in 150 s"), 150000);
   await b.ask("document.getElementById('mvc').click(); document.getElementById('record').click(); 1");
   await until("the maximum", () => b.ask("/Stored in/.test(document.getElementById('mvc-state').textContent)"));
   await until("the recording's end", () => b.ask("document.getElementById('record').getAttribute('aria-pressed') === 'false'"));
-  must(await b.ask("[...document.querySelectorAll('button,select,input,canvas')].every(e => e.getAttribute('aria-label') || e.textContent.trim() || e.closest('label'))"), "a control without a name");
+  must(await b.ask("[...document.querySelectorAll('button,select,input,canvas')].every(e => e.getAttribute('aria-label') || e.textContent.trim() || e.closest('label,[role=img]'))"), "a control without a name");
   phase("buttons");
+  // something is drawn: no line of the page threw, the figure is not empty, the plots have their canvas
+  must(await b.ask("window.thrown === undefined"), "the page threw: " + await b.ask("String(window.thrown)"));
+  await until("the figure", () => b.ask("(() => { const c = document.getElementById('figure'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; return d.some(v => v > 0); })()"));
+  must(await b.ask("['band', 'force', 'angle', 'activation'].every(id => document.querySelector('#' + id + ' canvas'))"), "a plot is missing");
+  must(await b.ask("/^-?[0-9.]+$/.test(document.getElementById('big').textContent)"), "no large number");
   await b.picture("desktop.png", 1280, 900, false);
   await b.picture("phone.png", 390, 844, true);
   await b.ask("window.confirm = () => true; document.getElementById('stop').click(); 1");

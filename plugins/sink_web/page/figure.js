@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+// figure.js: the posture as a stick figure, muscles along their paths.
 "use strict";
+const view = { yaw: .6, pitch: .15, zoom: 1 };
 /* ---- stick figure: bones between the bodies' origins and their parents', muscles along their paths ---- */
 function points(name) {
   const p = place[name], out = []; if (!p || !frame) return out;

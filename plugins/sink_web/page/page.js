@@ -5,6 +5,7 @@
 const HEAD = 8, SECONDS = 10, token = new URLSearchParams(location.search).get("token") || "";
 let run = null, up = 1, place = {}, history = [], frame = null, socket = null, picked = [], received = 0, dirty = true, drawn = 0;
 const latencies = [], recorded = JSON.parse($("recorded").textContent);
+window.onerror = what => { window.thrown = what; };
 window.mhe = { get received() { return received; }, get frame() { return frame; }, get run() { return run; }, get uplot() { return typeof uPlot !== "undefined"; } }; // for tests and the curious
 
 function connect() {
