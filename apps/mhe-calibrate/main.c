@@ -64,13 +64,17 @@ static int32_t show(void *data, int32_t iteration, double objective, double kkt)
     return 0;
 }
 
+/* Markers as they are, muscles about as EMG says, and residual torques for what the model's muscles
+ * then lack: a motion to start from, however wrong the model is. */
+#define START_COSTS "costs=[{plugin: mhe.cost.emg-markers, residual_torque: 10}]"
+
 /* The config with the solver that section calibrate asks for: all of a motion at once needs no
- * real-time iteration. */
+ * real-time iteration; and that of the start. */
 static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run **run,
-                           mhe_error *err) {
+                           mhi_run **start, mhe_error *err) {
     mhi_plan plan;
     mhi_arena arena = {0};
-    const char **set = MHI_TAKE(&arena, const char *, a->set.n + 1);
+    const char **set = MHI_TAKE(&arena, const char *, a->set.n + 2);
     mhe_status status = mhi_run_read(a->config, a->set.values, a->set.n, registry, run, err);
     if (status == MHE_OK) {
         status = mhi_plan_read(*run, &plan, err);
@@ -83,12 +87,16 @@ static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run *
             set[i] = a->set.values[i];
         }
         set[a->set.n] = mhi_arena_format(
-            &arena, "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %.17g}",
+            &arena, "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %g}",
             plan.solver == 0 ? "rti" : "ipopt", plan.solver == 0 ? "preset: robust, " : "",
-            (int)plan.max_iterations, plan.tolerance);
+            (int)plan.max_iterations, fmin(1e-4, plan.tolerance));
         mhi_run_free(*run);
         *run = NULL;
         status = mhi_run_read(a->config, set, a->set.n + 1, registry, run, err);
+        set[a->set.n + 1] = START_COSTS;
+    }
+    if (status == MHE_OK) {
+        status = mhi_run_read(a->config, set, a->set.n + 2, registry, start, err);
     }
     mhi_arena_free(&arena);
     return status;
@@ -197,11 +205,11 @@ static mhe_status tell(arguments *a, mhi_calibration *c, mhe_error *err) {
 
 static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *registry,
                             mhe_error *err) {
-    mhi_run *run = NULL;
+    mhi_run *run = NULL, *start = NULL;
     mhi_calibration c = {.progress = NULL};
-    mhe_status status = read_run(a, registry, &run, err);
+    mhe_status status = read_run(a, registry, &run, &start, err);
     if (status == MHE_OK) {
-        status = mhi_calibration_open(run, host, &c, err);
+        status = mhi_calibration_open(run, start, host, &c, err);
         c.progress = show;
         c.data = a;
     }
@@ -213,6 +221,7 @@ static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *re
     }
     mhi_calibration_close(&c);
     mhi_run_free(run);
+    mhi_run_free(start);
     return status;
 }
 

@@ -9,9 +9,11 @@
  * last full Newton correction and the implicit function theorem.
  *
  * With a memory the start is the step as it was linearised last, moved to first order by what its
- * data have changed: one solve. With derivatives wanted, full Newton iterations follow (between
- * neighbouring iterates of an estimator one, seldom two), else simplified ones on the factors that
- * are there.
+ * data have changed: one solve. What that leaves grows with the square of the move. With
+ * derivatives wanted, full Newton iterations follow (between neighbouring iterates of an estimator
+ * one, seldom two; behind a long move a simplified one goes first, which costs no derivatives),
+ * else simplified ones on the factors that are there. A step that has not moved is linearised
+ * already.
  *
  * States z of the muscles are stages beside the accelerations (states.c). They are too stiff for
  * one Jacobian to serve several stages: each iteration that takes a new one takes all. */
@@ -29,6 +31,10 @@
 #define RK_BEFORE_LAST 1e-6
 #define RK_LAST 1e-5
 #define RK_LAST_ROUNDS 3
+/* A move from the memory leaves about this, times its square (the arms here: 0.007 to 0.02). */
+#define RK_BENT 0.02
+/* Below this a step has not moved: its derivatives are off by as much. */
+#define RK_UNMOVED 1e-9
 
 /* Stage position and velocity from the stage accelerations. */
 static void rk_stage(struct rk_context *c, double h, int32_t j) {
@@ -212,14 +218,14 @@ static mhe_status rk_predict_states(struct rk_context *c, const double *r, mhe_e
 }
 
 /* Stage accelerations from those of the last step of this length that was linearised here: to first
- * order in what its data have changed by. 0: nothing is known. */
-static int rk_recall(struct rk_context *c, const double *r, double h) {
+ * order in what its data have changed by. Returns the size of the move, NaN: nothing is known. */
+static double rk_recall(struct rk_context *c, const double *r, double h) {
     const struct rk_tableau *t = &c->rk->mechanics;
     const mhe_system *system = c->rk->system;
     const struct rk_slot *at = &c->kept;
     int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n = t->stages * n_q;
     if (!rk_memory_slot(c, &c->kept) || *at->step != h) {
-        return 0;
+        return NAN;
     }
     for (int32_t k = 0; k < n; k++) {
         int32_t j = k / n_q;
@@ -244,7 +250,7 @@ static int rk_recall(struct rk_context *c, const double *r, double h) {
         rk_states_recall(c, h);
     }
     memcpy(c->K, at->K, sizeof(double) * (size_t)n);
-    return isfinite(rk_correct(c, h));
+    return rk_correct(c, h);
 }
 
 /* Keeps the step just linearised. */
@@ -256,6 +262,9 @@ static void rk_keep(const struct rk_context *c, const double *r, double h) {
     memcpy(at->v, c->v, sizeof(double) * (size_t)n_q);
     for (int32_t i = 0; i < system->n_r; i++) {
         at->r[i] = r[i];
+    }
+    for (int32_t i = 0; i < system->n_w; i++) {
+        at->w[i] = c->w[i];
     }
     memcpy(at->stage_a, c->stage_a, sizeof(double) * (size_t)(s * system->n_m));
     memcpy(at->K, c->K, sizeof(double) * (size_t)(s * n_q));
@@ -296,16 +305,17 @@ static mhe_status rk_iterate(struct rk_context *c, const double *r, double h, in
                              : mhe_fail(err, MHE_RETRY, "a step of %g s left the finite", h);
 }
 
-/* Iterates until the error left in the stages is estimated below `goal`. */
+/* Iterates until the error left in the stages is estimated below `goal`. `shrink`: what the first
+ * iteration is known to leave of its correction at most. */
 static mhe_status rk_newton(struct rk_context *c, const double *r, double h, int jacobian,
-                            double goal, mhe_error *err) {
-    double change = 0, last = 0, shrink = 1;
+                            double shrink, double goal, mhe_error *err) {
+    double change = 0, last = 0;
     for (int32_t iteration = 0; iteration < c->rk->config.max_newton; iteration++) {
         mhe_status status = rk_iterate(c, r, h, jacobian, &change, err);
         if (status != MHE_OK) {
             return status;
         }
-        shrink = iteration > 0 && last > 0 ? change / last : 1;
+        shrink = iteration > 0 ? last > 0 ? change / last : 1 : shrink;
         double left = shrink < 0.5 ? change * shrink / (1 - shrink) : change;
         if (left < goal) {
             return MHE_OK;
@@ -330,13 +340,39 @@ static mhe_status rk_linearise(struct rk_context *c, const double *r, double h, 
     return status;
 }
 
+/* Whether the size of the move tells all that can have changed: inputs are compared, parameters
+ * have other values without a word. */
+static int rk_is_kept_whole(const struct rk_context *c) {
+    const mhe_system *system = c->rk->system;
+    return system->n_z == 0 && system->n_p == 0 &&
+           (system->n_w == 0 || memcmp(c->w, c->kept.w, sizeof(double) * (size_t)system->n_w) == 0);
+}
+
+/* Stages behind a move from the memory. The Jacobian there is off by the order of the move, and so
+ * is what a simplified iteration leaves. */
+static mhe_status rk_move_on(struct rk_context *c, const double *r, double h, double moved,
+                             int32_t derivatives, mhe_error *err) {
+    double change = 0;
+    mhe_status status = MHE_OK;
+    if (!derivatives) {
+        return rk_newton(c, r, h, RK_JACOBIAN_KEPT, fmin(1, moved), c->rk->config.newton_tolerance,
+                         err);
+    }
+    if (moved < RK_UNMOVED && rk_is_kept_whole(c)) {
+        return MHE_OK;
+    }
+    if (RK_BENT * moved * moved > RK_LAST && c->rk->system->n_z == 0) {
+        status = rk_iterate(c, r, h, RK_JACOBIAN_KEPT, &change, err);
+    }
+    return status == MHE_OK ? rk_linearise(c, r, h, err) : status;
+}
+
 /* Stages of an implicit scheme; from nothing where what is known does not lead there. */
 static mhe_status rk_implicit(struct rk_context *c, const double *r, double h, int32_t derivatives,
                               mhe_error *err) {
-    double tolerance = c->rk->config.newton_tolerance;
-    if (rk_recall(c, r, h)) {
-        mhe_status status = derivatives ? rk_linearise(c, r, h, err)
-                                        : rk_newton(c, r, h, RK_JACOBIAN_KEPT, tolerance, err);
+    double tolerance = c->rk->config.newton_tolerance, moved = rk_recall(c, r, h);
+    if (isfinite(moved)) {
+        mhe_status status = rk_move_on(c, r, h, moved, derivatives, err);
         if (status <= MHE_OK) {
             return status;
         }
@@ -345,7 +381,7 @@ static mhe_status rk_implicit(struct rk_context *c, const double *r, double h, i
     mhe_status status =
         c->rk->system->n_z > 0 ? rk_predict_states(c, r, err) : rk_predict(c, r, h, err);
     if (status == MHE_OK) { /* the middle stage is nearer to all than the start is */
-        status = rk_newton(c, r, h, RK_JACOBIAN_MIDDLE,
+        status = rk_newton(c, r, h, RK_JACOBIAN_MIDDLE, 1,
                            derivatives ? fmax(tolerance, RK_BEFORE_LAST) : tolerance, err);
     }
     return status == MHE_OK && derivatives ? rk_linearise(c, r, h, err) : status;

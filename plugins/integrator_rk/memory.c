@@ -23,7 +23,8 @@ static double *rk_take(double **next, int32_t n) {
 int32_t rk_slot_size(const struct rk *rk) {
     int32_t q = rk->system->n_q, m = rk->system->n_m, r = rk->system->n_r;
     int32_t s = rk->mechanics.stages, n = s * q;
-    int32_t size = 1 + 2 * q + r + s * m + n + 2 * n * q + n * m + n * r + n * n + n;
+    int32_t size =
+        1 + 2 * q + r + rk->system->n_w + s * m + n + 2 * n * q + n * m + n * r + n * n + n;
     int32_t z = rk->system->n_z, k = rk->system->n_k;
     size += (n + s * z) * rk->system->n_p;
     return z == 0 ? size
@@ -38,6 +39,7 @@ void rk_slot_at(const struct rk *rk, double *memory, struct rk_slot *out) {
     out->q = rk_take(&memory, q);
     out->v = rk_take(&memory, q);
     out->r = rk_take(&memory, r);
+    out->w = rk_take(&memory, rk->system->n_w);
     out->stage_a = rk_take(&memory, s * m);
     out->K = rk_take(&memory, n);
     out->f_q = rk_take(&memory, n * q);

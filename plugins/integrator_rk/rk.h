@@ -82,6 +82,7 @@ struct rk {
 struct rk_slot {
     double *step;                  /* [1] its length; 0: nothing is known */
     double *q, *v, *r, *stage_a;   /* [n_q], [n_q], [n_r], [s x n_m] its data */
+    double *w;                     /* [n_w] the interval's inputs */
     double *K;                     /* [s x n_q] the stages it found */
     double *f_q, *f_v, *f_a, *f_r; /* [s x ...] derivatives at the stages */
     double *f_p, *h_p;             /* [s x n_q x n_p], [s x n_z x n_p] */

@@ -50,29 +50,42 @@ static void rk_carry(struct rk_context *c, double h) {
     }
 }
 
-/* Adds the direct effect of stage activations, residual torques and parameters on (q+, v+) to
+/* Adds the direct effect of the activations of stage j on (q+, v+), by w [n_q x 2 n_q], to
  * sens_next. */
+static void rk_direct_activations(struct rk_context *c, int32_t j, const double *w) {
+    const mhe_system *system = c->rk->system;
+    int32_t n_q = system->n_q, n_m = system->n_m, n_d = system->n_d;
+    int32_t two = system->first_d, columns = c->columns, of_a = two, of_e = of_a + n_d;
+    const double *stage_a_a = c->stage_a_a + j * n_m, *stage_a_e = c->stage_a_e + j * n_m;
+    const double *f_a = c->at->f_a + j * n_q * n_m;
+    if (n_d == 0) { /* they are the controls */
+        rk_product(two, n_m, n_q, w, two, f_a, n_m, c->sens_next + of_e, columns);
+        return;
+    }
+    memset(c->direct, 0, sizeof(double) * (size_t)(two * n_m));
+    rk_product(two, n_m, n_q, w, two, f_a, n_m, c->direct, n_m);
+    for (int32_t i = 0; i < two; i++) {
+        const double *row = c->direct + i * n_m;
+        double *by_a = c->sens_next + i * columns + of_a;
+        double *by_e = c->sens_next + i * columns + of_e;
+        for (int32_t m = 0; m < n_d; m++) {
+            by_a[m] += row[m] * stage_a_a[m];
+        }
+        for (int32_t m = 0; m < n_m; m++) {
+            by_e[m] += row[m] * stage_a_e[m];
+        }
+    }
+}
+
+/* The same of stage activations, residual torques and parameters of all stages. */
 static void rk_direct(struct rk_context *c) {
     const mhe_system *system = c->rk->system;
-    int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n_d = system->n_d;
-    int32_t n_p = system->n_p, two = system->first_d, columns = c->columns;
-    int32_t of_a = two, of_e = of_a + n_d, of_r = of_e + n_m, of_p = of_r + n_r;
+    int32_t n_q = system->n_q, n_r = system->n_r, n_p = system->n_p;
+    int32_t two = system->first_d, columns = c->columns;
+    int32_t of_r = two + system->n_d + system->n_m, of_p = of_r + n_r;
     for (int32_t j = 0; j < c->rk->mechanics.stages; j++) {
-        const double *stage_a_a = c->stage_a_a + j * n_m, *stage_a_e = c->stage_a_e + j * n_m;
         const double *w = c->adjoint + j * n_q * two;
-        memset(c->direct, 0, sizeof(double) * (size_t)(two * n_m));
-        rk_product(two, n_m, n_q, w, two, c->at->f_a + j * n_q * n_m, n_m, c->direct, n_m);
-        for (int32_t i = 0; i < two; i++) {
-            const double *row = c->direct + i * n_m;
-            double *by_a = c->sens_next + i * columns + of_a;
-            double *by_e = c->sens_next + i * columns + of_e;
-            for (int32_t m = 0; m < n_d; m++) {
-                by_a[m] += row[m] * stage_a_a[m];
-            }
-            for (int32_t m = 0; m < n_m; m++) {
-                by_e[m] += row[m] * stage_a_e[m];
-            }
-        }
+        rk_direct_activations(c, j, w);
         if (n_r > 0) {
             rk_product(two, n_r, n_q, w, two, c->at->f_r + j * n_q * n_r, n_r, c->sens_next + of_r,
                        columns);

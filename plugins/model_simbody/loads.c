@@ -29,8 +29,13 @@ static ground_load to_ground(const simbody_context *c, const mhe_load *load, con
                        .origin = link_of(c->tree, load->origin)};
     double p[3];
     bodies_pose(c, load->axes, out.axes_r, p);
-    rotate3(out.axes_r, value, out.f);
-    rotate3(out.axes_r, value + 6, out.t);
+    if (load->axes < 0) { /* as most are: ground's axes */
+        memcpy(out.f, value, sizeof out.f);
+        memcpy(out.t, value + 6, sizeof out.t);
+    } else {
+        rotate3(out.axes_r, value, out.f);
+        rotate3(out.axes_r, value + 6, out.t);
+    }
     bodies_pose(c, load->origin, out.origin_r, p);
     place3(out.origin_r, p, value + 3, out.x);
     return out;
@@ -81,7 +86,9 @@ static void add_force(const simbody_context *c, int32_t link, const double *forc
     }
 }
 
-/* d tau/dq of one load. Joints that move it: those that carry its body, its axes or its origin. */
+/* d tau/dq of one load. Joints that move it: those that carry its body, its axes or its origin.
+ * That joint j moves the axis of a joint i beyond it counts as (S_j x S_i) . F = -S_i . (S_j x* F).
+ */
 static void add_derivative(const simbody_context *c, const ground_load *load, const double *force,
                            double *tau_q) {
     const tree *t = c->tree;
@@ -90,16 +97,20 @@ static void add_derivative(const simbody_context *c, const ground_load *load, co
         if (!below && !carries(t, j, load->axes) && !carries(t, j, load->origin)) {
             continue;
         }
-        double change[6];
+        double change[6], turned[6];
         force_change(c, load, j, change);
-        for (int32_t i = load->link; i >= 0; i = t->joints[i].parent) {
-            double by = dot6(c->links[i].axis, change), turned[6];
-            if (i > j && carries(t, j, i)) {
-                cross_motion(c->links[j].axis, c->links[i].axis, turned);
-                by += dot6(turned, force);
-            }
+        cross_force(c->links[j].axis, force, turned);
+        for (int k = 0; k < 6; k++) {
+            turned[k] = change[k] - turned[k];
+        }
+        int32_t i = load->link;
+        for (; i > j && below; i = t->joints[i].parent) {
             tau_q[t->joints[i].coordinate * t->n_q + column] +=
-                c->slopes[4 * i + 1] * by * c->slopes[4 * j + 1];
+                c->slopes[4 * i + 1] * dot6(c->links[i].axis, turned) * c->slopes[4 * j + 1];
+        }
+        for (; i >= 0; i = t->joints[i].parent) {
+            tau_q[t->joints[i].coordinate * t->n_q + column] +=
+                c->slopes[4 * i + 1] * dot6(c->links[i].axis, change) * c->slopes[4 * j + 1];
         }
         if (below) { /* the function's own slope */
             tau_q[column * t->n_q + column] += c->slopes[4 * j + 2] * dot6(c->links[j].axis, force);

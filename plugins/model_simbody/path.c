@@ -132,19 +132,38 @@ INLINED void lanes_place(const path_pose *pose, int32_t link, const path_lanes *
     }
 }
 
-/* Adds the lanes to entry `at` of their muscles' blocks of `stride`. */
-INLINED void lanes_scatter(const path_bundle *bundle, const path_lanes *lanes, int32_t stride,
-                           int32_t at, double *out) {
+/* Where each lane's muscle has its block. */
+typedef struct lane_blocks {
+    double *of[PATH_LANES];
+} lane_blocks;
+
+INLINED lane_blocks lanes_blocks(const path_bundle *bundle, size_t stride, double *out) {
+    lane_blocks blocks;
+    for (int lane = 0; lane < PATH_LANES; lane++) {
+        blocks.of[lane] = out + (size_t)bundle->muscle[lane] * stride;
+    }
+    return blocks;
+}
+
+/* Adds the lanes to entry `at` of their muscles' blocks. */
+INLINED void lanes_scatter(const path_bundle *bundle, const path_lanes *lanes,
+                           const lane_blocks *blocks, int32_t at) {
+    if (bundle->count == PATH_LANES) { /* unrolled */
+        for (int lane = 0; lane < PATH_LANES; lane++) {
+            blocks->of[lane][at] += (*lanes)[lane];
+        }
+        return;
+    }
     for (int lane = 0; lane < bundle->count; lane++) {
-        out[(size_t)bundle->muscle[lane] * (size_t)stride + (size_t)at] += (*lanes)[lane];
+        blocks->of[lane][at] += (*lanes)[lane];
     }
 }
 
 /* Steps of a bundle, and its share in dL/dq (and the f'' terms of d2L/dq2). */
 INLINED void bundle_slopes(const tree *t, const path_pose *pose, const path_bundle *bundle,
                            const path_lanes *to, const path_lanes *from, const path_lanes *u,
-                           const path_lanes *inverse, path_step *steps, double *length_q,
-                           double *length_qq) {
+                           const path_lanes *inverse, path_step *steps, const lane_blocks *first,
+                           const lane_blocks *second_ones) {
     const tree_segment *segment = bundle->segment;
     const path_lanes none = {0};
     for (int32_t k = 0; k < segment->n_to + segment->n_from; k++) {
@@ -166,14 +185,13 @@ INLINED void bundle_slopes(const tree *t, const path_pose *pose, const path_bund
         path_lanes along = sign * LANES_DOT3(u, change), slope = f[1] * along;
         step->side = k < segment->n_to;
         step->coordinate = t->joints[joint].coordinate;
-        lanes_scatter(bundle, &slope, t->n_q, step->coordinate, length_q);
-        if (length_qq == NULL) {
+        lanes_scatter(bundle, &slope, first, step->coordinate);
+        if (second_ones == NULL) {
             continue;
         }
         path_lanes second = f[2] * along;
         if (f[2] != 0) {
-            lanes_scatter(bundle, &second, t->n_q * t->n_q, step->coordinate * (t->n_q + 1),
-                          length_qq);
+            lanes_scatter(bundle, &second, second_ones, step->coordinate * (t->n_q + 1));
         }
         for (int i = 0; i < 3; i++) {
             step->arm[i] = sign * f[1] * change[i];
@@ -184,7 +202,7 @@ INLINED void bundle_slopes(const tree *t, const path_pose *pose, const path_bund
 
 /* The other terms of d2L/dq2: pairs of steps. */
 INLINED void bundle_curvature(const path_bundle *bundle, const path_step *steps, int32_t n_q,
-                              double *length_qq) {
+                              const lane_blocks *blocks) {
     int32_t n = bundle->segment->n_to + bundle->segment->n_from;
     for (int32_t i = 0; i < n; i++) {
         for (int32_t j = i; j < n; j++) { /* on one side, i carries j */
@@ -193,9 +211,9 @@ INLINED void bundle_curvature(const path_bundle *bundle, const path_step *steps,
             if (steps[i].side == steps[j].side) {
                 entry += LANES_DOT3(steps[i].bend, steps[j].arm);
             }
-            lanes_scatter(bundle, &entry, n_q * n_q, row * n_q + column, length_qq);
+            lanes_scatter(bundle, &entry, blocks, row * n_q + column);
             if (i != j) {
-                lanes_scatter(bundle, &entry, n_q * n_q, column * n_q + row, length_qq);
+                lanes_scatter(bundle, &entry, blocks, column * n_q + row);
             }
         }
     }
@@ -216,7 +234,8 @@ CLONES static void bundle_lengths(const tree *t, const path_bundle *bundle, cons
         inverse[lane] = l[lane] < COINCIDENT ? 0 : 1 / l[lane];
     }
     if (length != NULL) {
-        lanes_scatter(bundle, &l, 1, 0, length);
+        const lane_blocks at = lanes_blocks(bundle, 1, length);
+        lanes_scatter(bundle, &l, &at, 0);
     }
     if (length_q == NULL) {
         return;
@@ -224,10 +243,15 @@ CLONES static void bundle_lengths(const tree *t, const path_bundle *bundle, cons
     for (int k = 0; k < 3; k++) {
         u[k] *= inverse;
     }
-    bundle_slopes(t, pose, bundle, to, from, u, &inverse, steps, length_q, length_qq);
-    if (length_qq != NULL) {
-        bundle_curvature(bundle, steps, t->n_q, length_qq);
+    const size_t n_q = (size_t)t->n_q;
+    const lane_blocks first = lanes_blocks(bundle, n_q, length_q);
+    if (length_qq == NULL) {
+        bundle_slopes(t, pose, bundle, to, from, u, &inverse, steps, &first, NULL);
+        return;
     }
+    const lane_blocks second = lanes_blocks(bundle, n_q * n_q, length_qq);
+    bundle_slopes(t, pose, bundle, to, from, u, &inverse, steps, &first, &second);
+    bundle_curvature(bundle, steps, t->n_q, &second);
 }
 
 void path_lengths(const tree *t, const path_bundle *bundles, int32_t n_bundles,

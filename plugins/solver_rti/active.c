@@ -18,8 +18,10 @@
 #include <string.h>
 
 #define MOST_SETS 8
-#define MANY_SETS 40 /* of whole recordings with parameters */
+#define MANY_SETS 20 /* of whole recordings with parameters */
 #define MOST_CORRECTIONS 3
+#define NEAR_BOUNDS \
+    1e-4 /* of a set that is taken before it settles: multipliers are HOLD times it */
 
 /* What lies in the way of a look at all variables. */
 typedef struct look {
@@ -118,9 +120,9 @@ static int32_t solve_set(qp *q, double regularisation) {
 static int32_t see_one(qp *q, ptrdiff_t at, double crossed, double pulled, look *l) {
     const double y = q->slope[at];
     if (q->side[at] == 0) {
-        l->stationarity = fmax(l->stationarity, fabs(y));
+        l->stationarity = larger(l->stationarity, fabs(y));
     } else {
-        l->feasibility = fmax(l->feasibility, fabs(q->w[at] - active_bound(q, at)));
+        l->feasibility = larger(l->feasibility, fabs(q->w[at] - active_bound(q, at)));
     }
     q->rhs[at] = q->side[at] == 0 ? 0 : y;
     if (!active_turn(q, at, q->w[at], y, crossed, pulled)) {
@@ -142,7 +144,7 @@ static look see(qp *q, const qp_limits *limits) {
     qp_slope(s, q->stages, q->w, q->lambda, q->slope);
     qp_gaps(s, q->stages, q->w, q->gap);
     for (size_t i = 0; i < size_x(s); i++) {
-        l.feasibility = fmax(l.feasibility, fabs(q->gap[i]));
+        l.feasibility = larger(l.feasibility, fabs(q->gap[i]));
     }
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = first_of(s, k); i < s->n_z; i++) {
@@ -197,8 +199,8 @@ static int32_t is_good(const look *l, const qp_limits *limits) {
 
 static void finish(qp *q, const look *l) {
     for (size_t i = 0; i < size_z(q->shape); i++) {
-        q->z_lower[i] = q->side[i] != 0 ? fmax(0, q->rhs[i]) : 0;
-        q->z_upper[i] = q->side[i] != 0 ? fmax(0, -q->rhs[i]) : 0;
+        q->z_lower[i] = q->side[i] != 0 ? larger(0, q->rhs[i]) : 0;
+        q->z_upper[i] = q->side[i] != 0 ? larger(0, -q->rhs[i]) : 0;
     }
     q->stationarity = l->stationarity;
     q->feasibility = l->feasibility;
@@ -213,7 +215,7 @@ static void settle(qp *q) {
         double *now = row_z(s, q->w, k), *next = row_z(s, q->w, k + 1) + s->n_u;
         const ptrdiff_t at = (ptrdiff_t)k * s->ld_z;
         for (int32_t i = 0; i < s->n_u; i++) {
-            now[i] = fmin(fmax(now[i], q->lower[at + i]), q->upper[at + i]);
+            now[i] = smaller(q->upper[at + i], larger(q->lower[at + i], now[i]));
         }
         memcpy(next, q->stages[k].b, sizeof(double) * (size_t)s->n_x);
         qp_forward(s, &q->stages[k], now, next);
@@ -250,6 +252,8 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
         }
         if (l.changes == 0) {
             result = is_good(&l, limits) ? QP_SOLVED : -1;
+        } else if (l.changes <= limits->unsettled && l.feasibility <= NEAR_BOUNDS) {
+            result = QP_SOLVED;
         }
     }
     if (result == QP_LATE && q->iterations > 0) {

@@ -42,9 +42,12 @@ void border_begin(qp *q) {
     double *D = q->border->D;
     memset(D, 0, sizeof(double) * (size_t)(s->n_p * s->ld_p));
     for (int32_t k = 0; k <= s->N; k++) {
-        for (int32_t i = 0; i < s->n_p; i++) {
-            for (int32_t j = 0; j < s->n_p; j++) {
-                D[i * s->ld_p + j] += q->stages[k].D[i * s->n_p + j];
+        const qp_stage *stage = &q->stages[k];
+        for (int32_t i = 0; i < stage->n_costly; i++) {
+            const int32_t row = stage->costly[i];
+            for (int32_t j = 0; j < stage->n_costly; j++) {
+                const int32_t at = stage->costly[j];
+                D[row * s->ld_p + at] += stage->D[row * s->n_p + at];
             }
         }
     }
@@ -84,16 +87,16 @@ static columns columns_of(const qp *q) {
     return (columns){m, m + x, m + 2 * x, m + 3 * x, m + 3 * x + z};
 }
 
-/* How many rows of P can be other than 0: parameters rarely reach states of their own equations. */
-static int32_t last_row(const qp_shape *s, const double *Pt) {
-    for (int32_t i = 0; i < s->n_p; i++) {
-        for (int32_t j = s->n_dense; j < s->n_x; j++) {
-            if (Pt[i * s->ld_x + j] != 0) {
-                return s->n_x;
-            }
+/* C^T of n variables from `first` on. */
+static void read_costs(const qp_shape *s, const qp_stage *stage, int32_t first, int32_t n,
+                       double *to) {
+    memset(to, 0, sizeof(double) * (size_t)(n * s->ld_p));
+    for (int32_t i = 0; i < stage->n_costly; i++) {
+        const double *row = stage->C + (ptrdiff_t)stage->costly[i] * s->ld_z + first;
+        for (int32_t j = 0; j < n; j++) {
+            to[j * s->ld_p + stage->costly[i]] = row[j];
         }
     }
-    return s->n_dense;
 }
 
 /* m = G + F^T V */
@@ -117,12 +120,12 @@ static void step_back(qp *q, int32_t k, const columns *c) {
     const qp_stage *stage = &q->stages[k];
     const riccati *r = &q->riccati;
     const kernels *const use = s->kernels;
-    const int32_t ld = s->ld_p, n = s->n_p, n_rows = last_row(s, stage->Pt);
+    const int32_t ld = s->ld_p, n = s->n_p, n_rows = stage->n_reached;
     const double *next = r->P + (ptrdiff_t)(k + 1) * s->n_x * s->ld_x;
     const double *M = r->M + (ptrdiff_t)k * s->n_z * s->ld_z;
     double *sum = q->border->sum;
-    use->transpose(n, s->n_x, stage->Pt, s->ld_x, c->P, ld);
-    use->transpose(n, s->n_z, stage->C, s->ld_z, c->G, ld);
+    use->transpose(n, n_rows, stage->Pt, s->ld_x, c->P, ld);
+    read_costs(s, stage, 0, s->n_z, c->G);
     use->product(s->n_x, n, n_rows, 1, next, s->ld_x, c->P, ld, c->p, c->V, ld, 0);
     use->product(n, n, n_rows, 1, c->P, ld, c->V, ld, sum, sum, ld, 1);
     use->product(n, n, n_rows, 1, c->p, ld, c->P, ld, sum, sum, ld, 1);
@@ -179,7 +182,7 @@ int32_t border_factor(qp *q, const uint8_t *held) {
     double *S = q->border->S;
     q->border->held = held;
     memcpy(q->border->sum, q->border->D, sizeof(double) * (size_t)(n * s->ld_p));
-    s->kernels->transpose(n, s->n_x, q->stages[s->N].C + s->n_u, s->ld_z, c.p, s->ld_p);
+    read_costs(s, &q->stages[s->N], s->n_u, s->n_x, c.p);
     for (int32_t k = s->N - 1; k >= 0; k--) {
         step_back(q, k, &c);
     }

@@ -14,7 +14,7 @@ typedef struct piece {
     size_t n;
 } piece;
 
-enum { N_PIECES = 26 };
+enum { N_PIECES = 27 };
 
 static void pieces(const qp_shape *s, kalman *f, piece *out) {
     const size_t N = (size_t)s->N, n = (size_t)s->n_dense, n_x = (size_t)s->n_x;
@@ -30,6 +30,7 @@ static void pieces(const qp_shape *s, kalman *f, piece *out) {
                                  {&f->W, (N + 1) * n * ld_w},
                                  {&f->W_inverse, (N + 1) * ld_d},
                                  {&f->D, (N + 1) * n * ld_x},
+                                 {&f->used, z},
                                  {&f->p, x + ld_x},
                                  {&f->K, x},
                                  {&f->closed, x},
@@ -111,6 +112,7 @@ static ptrdiff_t first_control(const kalman *f) {
 
 void kalman_begin(kalman *f, const qp_stage *stages) {
     const qp_shape *s = f->shape;
+    f->known = 0;
     for (int32_t k = 0; k <= s->N; k++) {
         double *h = row_z(s, f->h, k);
         for (int32_t i = 0; i < s->n_z; i++) {
@@ -249,6 +251,28 @@ static int32_t measure(kalman *f, const qp_stage *stage, const double *diagonal,
     return 1;
 }
 
+/* Whether stage k would come to what it was: its controls' covariances and the measurement after
+ * it. Takes note of the diagonals. */
+static int32_t is_kept(kalman *f, const double *diagonal, int32_t k) {
+    const qp_shape *s = f->shape;
+    const ptrdiff_t of_u = (ptrdiff_t)k * s->ld_z, of_x = of_u + s->ld_z + s->n_u;
+    const size_t u = sizeof(double) * (size_t)s->n_u, x = sizeof(double) * (size_t)f->n;
+    const int32_t kept = k < f->known && memcmp(f->used + of_u, f->inverse + of_u, u) == 0 &&
+                         memcmp(f->used + of_x, diagonal + of_x, x) == 0;
+    memcpy(f->used + of_u, f->inverse + of_u, u);
+    memcpy(f->used + of_x, diagonal + of_x, x);
+    return kept;
+}
+
+/* The first stage that has to be factorised. */
+static int32_t first_changed(kalman *f, const double *diagonal) {
+    int32_t first = f->shape->N;
+    for (int32_t k = f->shape->N - 1; k >= 0; k--) {
+        first = is_kept(f, diagonal, k) ? first : k;
+    }
+    return f->m == 0 ? first : 0;
+}
+
 int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
                       const uint8_t *held) {
     const qp_shape *s = f->shape;
@@ -260,16 +284,23 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
     }
     for (int32_t k = s->N - 1; k >= 0; k--) {
         if (!complete_squares(f, &stages[k], diagonal, k)) {
+            f->known = 0;
             return 0;
         }
     }
-    for (int32_t k = 0; k < s->N; k++) {
+    const int32_t first = first_changed(f, diagonal);
+    f->known = 0;
+    if (first > 0 && first < s->N) {
+        memcpy(f->after, D_of(f, first), sizeof(double) * (size_t)(f->n * s->ld_x));
+    }
+    for (int32_t k = first; k < s->N; k++) {
         close_loop(f, k);
         predict(f, &stages[k], k);
         if (!measure(f, &stages[k + 1], diagonal, k + 1)) {
             return 0;
         }
     }
+    f->known = s->N;
     return 1;
 }
 

@@ -28,6 +28,7 @@ typedef struct kalman {
     const qp_shape *shape;
     const uint8_t *held; /* [size_z] of the last factorisation: controls that are constants */
     int32_t n, m;        /* dense and simple states */
+    int32_t known;       /* stages that the last factorisation of this program got through */
     int32_t ld_d, ld_w;
     double *FT;         /* [N][n_z x ld_d] dense rows of F, transposed */
     double *h;          /* [size_z] diagonals of H */
@@ -37,6 +38,7 @@ typedef struct kalman {
     double *W;          /* [N+1][n x ld_w] factor of S = I + U Sigma U^T, and its U^-T U Sigma */
     double *W_inverse;  /* [N+1][ld_d] */
     double *D;          /* [N+1][n x ld_x] rows of the dense states of Sigma' */
+    double *used;       /* [size_z] diagonals that it was made with */
     double *p;          /* [size_x + ld_x] curvatures of the costs to go of simple states */
     double *K, *closed; /* [size_x] */
     double *inverse;    /* [size_z] 1/R' */
@@ -52,7 +54,9 @@ size_t kalman_size(const qp_shape *s); /* doubles */
 void kalman_place(kalman *f, const qp_shape *s, double *memory);
 /* Before the first factorisation of a program. */
 void kalman_begin(kalman *f, const qp_stage *stages);
-/* As riccati_factor() and riccati_solve(); `held` [size_z] are controls that are 0. */
+/* As riccati_factor() and riccati_solve(); `held` [size_z] are controls that are 0. Where all
+ * states are dense, what has not changed since the last factorisation of the program, from the
+ * first stage on, stays: sets differ in a few places. */
 int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
                       const uint8_t *held);
 void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const double *b, double *w,

@@ -87,6 +87,26 @@ static double pack_costs(const rti_solver *s, const rti_worker *of, int32_t has_
            finiteness(of->grad_u, n_u);
 }
 
+static int32_t is_zero(const double *row, int32_t n) {
+    int32_t zero = 1;
+    for (int32_t i = 0; i < n; i++) {
+        zero &= row[i] == 0;
+    }
+    return zero;
+}
+
+/* Which parameters the costs of a stage see; `all`: the first stage, which holds the priors and
+ * Levenberg's term. */
+static void list_costly(const qp_shape *shape, int32_t all, qp_stage *stage) {
+    stage->n_costly = 0;
+    for (int32_t i = 0; i < shape->n_p; i++) {
+        if (all || !is_zero(stage->C + (ptrdiff_t)i * shape->ld_z, shape->n_z) ||
+            !is_zero(stage->D + i * shape->n_p, shape->n_p)) {
+            stage->costly[stage->n_costly++] = i;
+        }
+    }
+}
+
 static double pack_parameter_costs(const rti_solver *s, const rti_worker *of, int32_t has_u,
                                    qp_stage *stage) {
     const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, n_p = s->shape.n_p;
@@ -103,6 +123,7 @@ static double pack_parameter_costs(const rti_solver *s, const rti_worker *of, in
         }
         stage->d[i] = s->scale * of->grad_p[i];
     }
+    list_costly(&s->shape, stage == s->here.stages || stage == s->trial.stages, stage);
     return finiteness(of->px, n_p * n_x) + finiteness(of->pu, has_u ? n_p * n_u : 0) +
            finiteness(of->pp, n_p * n_p) + finiteness(of->grad_p, n_p);
 }
@@ -114,6 +135,8 @@ static double pack_parameter_dynamics(const rti_solver *s, const rti_worker *of,
             stage->Pt[j * s->shape.ld_x + i] = of->P[i * n_p + j];
         }
     }
+    const int32_t dense = s->shape.n_dense;
+    stage->n_reached = is_zero(of->P + dense * n_p, (n_x - dense) * n_p) ? dense : n_x;
     return finiteness(of->P, n_p * n_x);
 }
 
@@ -281,7 +304,7 @@ double rti_first_gap(rti_solver *s, const double *w) {
     const int32_t known = status == MHE_OK && finiteness(of->x_next, s->shape.n_x) == 0;
     double gap = known ? 0 : INFINITY;
     for (int32_t i = 0; known && i < s->shape.n_x; i++) {
-        gap = fmax(gap, fabs(of->x_next[i] - next[i]));
+        gap = larger(gap, fabs(of->x_next[i] - next[i]));
     }
     s->seconds += rti_now() - start;
     s->failure = status < 0 ? status : MHE_OK;
@@ -372,9 +395,9 @@ static void add_variable(const rti_solver *s, const rti_point *point, ptrdiff_t 
         return; /* its multiplier bears any slope */
     }
     const double below = z_lower[at], above = z_upper[at], w = point->w[at];
-    r->stationarity = fmax(r->stationarity, fabs(s->slope[at] - below + above));
-    r->complementarity = fmax(r->complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
-    r->complementarity = fmax(r->complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
+    r->stationarity = larger(r->stationarity, fabs(s->slope[at] - below + above));
+    r->complementarity = larger(r->complementarity, below > 0 ? below * (w - s->lower[at]) : 0);
+    r->complementarity = larger(r->complementarity, above > 0 ? above * (s->upper[at] - w) : 0);
 }
 
 rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const double *lambda,
@@ -386,7 +409,7 @@ rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const doub
             add_variable(s, point, (ptrdiff_t)k * s->shape.ld_z + i, z_lower, z_upper, &r);
         }
         for (int32_t i = 0; k < s->shape.N && i < s->shape.n_x; i++) {
-            r.gap = fmax(r.gap, fabs(point->stages[k].b[i]));
+            r.gap = larger(r.gap, fabs(point->stages[k].b[i]));
         }
     }
     for (int32_t i = 0; i < s->shape.n_p; i++) {

@@ -17,6 +17,7 @@ typedef struct qp_limits { /* largest residuals of a solved program */
     double stationarity, feasibility, complementarity;
     int32_t max_iterations;
     double regularisation;
+    int32_t unsettled; /* bounds that may still come and go in a set that is taken */
     int32_t (*is_late)(const void *data); /* asked before each iteration; NULL: never */
     const void *data;
 } qp_limits;

@@ -69,7 +69,7 @@ static int32_t read_start(rti_solver *s, const mhe_solution *start) {
     gather(shape, start->x, start->u, start->p, s->trial.w);
     const int32_t finite = is_finite(s->trial.w, n);
     for (size_t i = 0; i < n; i++) {
-        s->trial.w[i] = fmin(fmax(s->trial.w[i], s->lower[i]), s->upper[i]);
+        s->trial.w[i] = smaller(s->upper[i], larger(s->lower[i], s->trial.w[i]));
     }
     if (!s->prepared || memcmp(s->trial.w, s->here.w, sizeof(double) * n) != 0) {
         memcpy(s->here.w, s->trial.w, sizeof(double) * n);
@@ -92,8 +92,8 @@ static int32_t read_start(rti_solver *s, const mhe_solution *start) {
         s->lambda[i] = s->warm ? scale * s->lambda[i] : 0;
     }
     for (size_t i = 0; i < n; i++) {
-        s->z_lower[i] = s->warm && isfinite(s->lower[i]) ? scale * fmax(0, s->z_lower[i]) : 0;
-        s->z_upper[i] = s->warm && isfinite(s->upper[i]) ? scale * fmax(0, s->z_upper[i]) : 0;
+        s->z_lower[i] = s->warm && isfinite(s->lower[i]) ? scale * larger(0, s->z_lower[i]) : 0;
+        s->z_upper[i] = s->warm && isfinite(s->upper[i]) ? scale * larger(0, s->z_upper[i]) : 0;
     }
     return finite;
 }
@@ -157,8 +157,8 @@ static void write_multipliers(rti_solver *s, mhe_solution *out) {
     qp_slope(shape, s->here.stages, s->leap.taken ? s->qp.w : NULL, s->lambda, s->slope);
     for (size_t i = 0; i < size_z(shape); i++) {
         if (s->lower[i] == s->upper[i]) {
-            s->z_lower[i] = fmax(0, s->slope[i]);
-            s->z_upper[i] = fmax(0, -s->slope[i]);
+            s->z_lower[i] = larger(0, s->slope[i]);
+            s->z_upper[i] = larger(0, -s->slope[i]);
         }
         s->z_lower[i] /= s->scale;
         s->z_upper[i] /= s->scale;
@@ -177,7 +177,7 @@ static double largest_gap(rti_solver *s) {
     double largest = 0;
     for (int32_t k = 0; k < s->shape.N; k++) {
         for (int32_t i = 0; i < s->shape.n_x; i++) {
-            largest = fmax(largest, fabs(s->here.stages[k].b[i]));
+            largest = larger(largest, fabs(s->here.stages[k].b[i]));
         }
     }
     return largest;

@@ -75,9 +75,10 @@ void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape
         (shape->in_order || shape->n_dense == n_x) && has_diagonal_costs(problem, shape->n_dense);
 }
 
-/* D and d of a stage, to the next multiple of 8. */
+/* D and d of a stage, and its list of parameters, to the next multiple of 8. */
 static size_t small_size(const qp_shape *s) {
-    return ((size_t)s->n_p * (size_t)(s->n_p + 1) + 7) / 8 * 8;
+    const size_t n_p = (size_t)s->n_p;
+    return (n_p * (n_p + 1) + (n_p * sizeof(int32_t) + 7) / 8 + 7) / 8 * 8;
 }
 
 size_t qp_stages_size(const qp_shape *s) {
@@ -100,6 +101,9 @@ void qp_stages_place(const qp_shape *s, double *memory, qp_stage *stages) {
         stage->Pt = stage->C + s->n_p * s->ld_z;
         stage->D = stage->Pt + s->n_p * s->ld_x;
         stage->d = stage->D + s->n_p * s->n_p;
+        stage->costly = (int32_t *)(stage->d + s->n_p);
+        stage->n_costly = 0;
+        stage->n_reached = s->n_x;
         memory = stage->D + small_size(s);
     }
 }
@@ -126,27 +130,43 @@ void qp_backward(const qp_shape *s, const qp_stage *stage, double alpha, const d
 }
 
 void qp_forward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *next) {
-    s->kernels->add_transposed(s->n_p, s->n_x, 1, stage->Pt, s->ld_x, p, next);
+    s->kernels->add_transposed(s->n_p, stage->n_reached, 1, stage->Pt, s->ld_x, p, next);
 }
 
 void qp_backward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *w_out) {
-    s->kernels->add_transposed(s->n_p, s->n_z, 1, stage->C, s->ld_z, p, w_out);
+    for (int32_t i = 0; i < stage->n_costly; i++) {
+        const double *row = stage->C + (ptrdiff_t)stage->costly[i] * s->ld_z;
+        const double value = p[stage->costly[i]];
+        for (int32_t j = 0; j < s->n_z; j++) {
+            w_out[j] += value * row[j];
+        }
+    }
+}
+
+void qp_add_costs_p(const qp_shape *s, const qp_stage *stage, const double *w, const double *p,
+                    double of_p, double *out) {
+    for (int32_t i = 0; i < stage->n_costly; i++) {
+        const int32_t at = stage->costly[i];
+        const double *C = stage->C + (ptrdiff_t)at * s->ld_z, *D = stage->D + at * s->n_p;
+        double by_w = 0, by_p = 0;
+        for (int32_t j = 0; j < s->n_z; j++) {
+            by_w += C[j] * w[j];
+        }
+        for (int32_t j = 0; j < stage->n_costly; j++) {
+            by_p += D[stage->costly[j]] * p[stage->costly[j]];
+        }
+        out[at] += by_w + of_p * by_p;
+    }
 }
 
 void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out) {
     const double *p = w + (ptrdiff_t)(s->N + 1) * s->ld_z;
     for (int32_t k = 0; k <= s->N && s->n_p > 0; k++) {
-        const qp_stage *stage = &stages[k];
-        s->kernels->add(s->n_p, s->n_z, 1, stage->C, s->ld_z, w + (ptrdiff_t)k * s->ld_z, out);
-        for (int32_t i = 0; i < s->n_p; i++) {
-            for (int32_t j = 0; j < s->n_p; j++) {
-                out[i] += stage->D[i * s->n_p + j] * p[j];
-            }
-        }
+        qp_add_costs_p(s, &stages[k], w + (ptrdiff_t)k * s->ld_z, p, 1, out);
         if (k < s->N) {
-            s->kernels->add(s->n_p, s->n_x, -1, stage->Pt, s->ld_x, lambda + (ptrdiff_t)k * s->ld_x,
-                            out);
+            s->kernels->add(s->n_p, stages[k].n_reached, -1, stages[k].Pt, s->ld_x,
+                            lambda + (ptrdiff_t)k * s->ld_x, out);
         }
     }
 }
@@ -161,7 +181,7 @@ static void slope_p(const qp_shape *s, const qp_stage *stages, const double *w,
             slope[i] += stages[k].d[i];
         }
         if (w == NULL && k < s->N) {
-            s->kernels->add(s->n_p, s->n_x, -1, stages[k].Pt, s->ld_x,
+            s->kernels->add(s->n_p, stages[k].n_reached, -1, stages[k].Pt, s->ld_x,
                             lambda + (ptrdiff_t)k * s->ld_x, slope);
         }
         if (w != NULL) {

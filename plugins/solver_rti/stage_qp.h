@@ -16,6 +16,14 @@
 
 #include <mhe/solver.h>
 
+/* Of two numbers, `a` where b is NaN: without the calls that fmax and fmin are. */
+static inline double larger(double a, double b) {
+    return b > a ? b : a;
+}
+static inline double smaller(double a, double b) {
+    return b < a ? b : a;
+}
+
 typedef struct qp_shape {
     int32_t N, n_x, n_u, n_z; /* n_z = n_u + n_x */
     int32_t ld_z, ld_x;
@@ -41,6 +49,9 @@ typedef struct qp_stage {
     double *b;       /* [ld_x] */
     double *C, *Pt;  /* [n_p x ld_z], and P^T [n_p x ld_x] */
     double *D, *d;   /* [n_p x n_p], [n_p] */
+    /* Parameters whose rows of C and D can be other than 0, and how many of the first rows of P
+     * can: a stage costs what few parameters change, and these reach few states. */
+    int32_t *costly, n_costly, n_reached;
 } qp_stage;
 
 /* Rows of a stage's vectors. */
@@ -75,6 +86,9 @@ void qp_backward(const qp_shape *s, const qp_stage *stage, double alpha, const d
 /* next [n_x] += P p, and w_out [n_z] += C^T p. */
 void qp_forward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *next);
 void qp_backward_p(const qp_shape *s, const qp_stage *stage, const double *p, double *w_out);
+/* out [n_p] += C w + of_p D p of a stage. */
+void qp_add_costs_p(const qp_shape *s, const qp_stage *stage, const double *w, const double *p,
+                    double of_p, double *out);
 /* out [n_p] += sum over stages of C_k w_k + D_k p - P_k^T lambda_k; `w` with its p. */
 void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out);

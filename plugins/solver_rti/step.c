@@ -8,6 +8,7 @@
 
 #define MAX_HALVINGS 8
 #define MOST_LOOSE 1e3
+#define UNSETTLED 1000     /* one of so many variables, far from the solution */
 #define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
 #define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
 #define MOST_DAMPING 1e9
@@ -49,12 +50,13 @@ static double looseness(const rti_solver *s) {
 static int32_t solve_program(rti_solver *s, int32_t from_last) {
     qp *q = &s->qp;
     const size_t n = size_z(&s->shape);
-    const double tolerance = s->config->tolerance * looseness(s);
+    const double loose = looseness(s), tolerance = s->config->tolerance * loose;
     const qp_limits limits = {.stationarity = 0.1 * tolerance,
                               .feasibility = fmax(1e-4 * tolerance, 1e-12),
                               .complementarity = 0.01 * tolerance,
                               .max_iterations = s->config->max_qp_iterations,
                               .regularisation = 1e-9,
+                              .unsettled = loose > 1 ? (int32_t)(n / UNSETTLED) : 0,
                               .is_late = s->control != NULL ? is_late : NULL,
                               .data = s};
     for (size_t i = 0; i < n; i++) {
@@ -78,7 +80,7 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
 static void reach(rti_solver *s, double length) {
     for (size_t i = 0; i < size_z(&s->shape); i++) {
         const double w = s->here.w[i] + length * s->qp.w[i];
-        s->trial.w[i] = fmin(fmax(w, s->lower[i]), s->upper[i]);
+        s->trial.w[i] = smaller(s->upper[i], larger(s->lower[i], w));
     }
 }
 
@@ -86,7 +88,7 @@ static void reach(rti_solver *s, double length) {
 static double longest(const rti_solver *s, int32_t from, int32_t n) {
     double length = 0;
     for (int32_t i = from; i < from + n; i++) {
-        length = fmax(length, fabs(s->trial.w[i] - s->here.w[i]));
+        length = larger(length, fabs(s->trial.w[i] - s->here.w[i]));
     }
     return length;
 }
@@ -140,13 +142,9 @@ static double model_cost_p(rti_solver *s) {
     }
     for (int32_t k = 0; k <= shape->N; k++) {
         const qp_stage *stage = &s->here.stages[k];
-        shape->kernels->add(shape->n_p, shape->n_z, 1, stage->C, shape->ld_z,
-                            row_z(shape, s->slope, k), slope);
+        qp_add_costs_p(shape, stage, row_z(shape, s->slope, k), step, 0.5, slope);
         for (int32_t i = 0; i < shape->n_p; i++) {
             slope[i] += stage->d[i];
-            for (int32_t j = 0; j < shape->n_p; j++) {
-                slope[i] += 0.5 * stage->D[i * shape->n_p + j] * step[j];
-            }
         }
     }
     for (int32_t i = 0; i < shape->n_p; i++) {
@@ -190,7 +188,7 @@ static double model_gaps(rti_solver *s, double *sum) {
             qp_forward_p(shape, &s->here.stages[k], row_p(shape, s->slope), gap);
         }
         for (int32_t i = 0; i < shape->n_x; i++) {
-            largest = fmax(largest, fabs(gap[i]));
+            largest = larger(largest, fabs(gap[i]));
             *sum += fabs(gap[i]);
         }
     }
@@ -201,7 +199,7 @@ static double model_gaps(rti_solver *s, double *sum) {
 static double largest_multiplier(const rti_solver *s) {
     double largest = 0;
     for (size_t i = 0; i < size_x(&s->shape); i++) {
-        largest = fmax(largest, fabs(s->qp.lambda[i]));
+        largest = larger(largest, fabs(s->qp.lambda[i]));
     }
     return largest;
 }

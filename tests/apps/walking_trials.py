@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded walks with whole-body models, against what OpenSim's own tools say of them.
 
-    walking_trials.py gait2392|walk3d PATH/mhe-run PATH/mhe-model SOURCE_DIR [KEEP_DIR]   status 77: the trial is not there
+    walking_trials.py gait2392|walk3d|static PATH/mhe-run PATH/mhe-model SOURCE_DIR [KEEP_DIR]   status 77: the trial is not there
 
 gait2392: the reference was made with the markers where OpenSim's Scale tool put them on this person (scaling/
 reference_subject01_simbody.osim), not where the model file has them: with those places the reference minimises its own
@@ -11,6 +11,9 @@ task's squares (knee_angle_l would be 4 degrees off else). Subtalar and metatars
 walk3d: the coordinates are the source's inverse kinematics on another fit of the model, changed by residual reduction, so
 markers alone cannot give them. They are taken as measured angles, low-passed (6 Hz, both ways) as its inverse dynamics had
 them, and the metatarsal joints are welded, as they were there.
+
+static: forces and joint reactions beside OpenSim's static optimisation (least squares of activations, rigid tendons, no
+passive forces). With KEEP_DIR also the figure of docs/walking.md, static.svg (gnuplot).
 """
 import json
 import math
@@ -20,7 +23,7 @@ import subprocess
 import sys
 import tempfile
 
-from walking import Runs, at, rms, table
+from walking import Runs, at, low_pass, rms, table
 
 NO_MUSCLE = ["pelvis_tilt", "pelvis_list", "pelvis_rotation", "pelvis_tx", "pelvis_ty", "pelvis_tz", "lumbar_extension",
              "lumbar_bending", "lumbar_rotation"] + [a + s for s in ("_r", "_l") for a in (
@@ -109,15 +112,15 @@ def report_moments(out, reference, start, end):
     print("moments, largest difference of peak: " + ", ".join("%s %.0f of %.0f" % (n, *off[n]) for n in off))
 
 
-def low_passed(source, target):
-    """Angles as the reference's inverse dynamics had them: 6 Hz, third order, both ways; ends turned over by half a recording."""
-    from walking import low_pass
+def every_tenth(source, target, smooth):
+    """Angles at 100 of their 1 000 Hz; smooth: as inverse dynamics had them, 6 Hz, third order, both ways."""
     lines = read(source).split("\n")
     head = next(k for k, line in enumerate(lines) if line.startswith("endheader")) + 2
     rows = [[float(x) for x in line.split()] for line in lines[head:] if line.strip()]
     h, columns = rows[1][0] - rows[0][0], list(zip(*rows))
-    smooth = [columns[0]] + [low_pass(list(column), h) for column in columns[1:]]
-    kept = list(zip(*smooth))[::10]  # 100 Hz
+    if smooth:
+        columns = [columns[0]] + [low_pass(list(column), h) for column in columns[1:]]
+    kept = list(zip(*columns))[::10]
     with open(target, "w") as file:
         file.write("\n".join([re.sub("nRows=.*", "nRows=%d" % len(kept), line) for line in lines[:head]] +
                              ["\t".join("%.10g" % x for x in row) for row in kept]) + "\n")
@@ -171,7 +174,7 @@ def walk3d(runs, folder):
     folder = os.path.join(folder, "walk3d")
     angles, emg = os.path.join(runs.work, "angles.sto"), table(os.path.join(folder, "electromyography.sto"))
     coordinates = table(os.path.join(folder, "coordinates.sto"))
-    low_passed(os.path.join(folder, "coordinates.sto"), angles)
+    every_tenth(os.path.join(folder, "coordinates.sto"), angles, True)
     tight = TRACK % "q, sigma: 0.001" + TRACK % "qdot, sigma: 0.02"
     least, _ = run(runs, "least", walk3d_text(folder, "angles: " + angles, {}, tight))
     least = activations(least, emg)
@@ -205,6 +208,67 @@ def walk3d(runs, folder):
         sum(e[i] for e in errors.values()) / len(errors) for i in (0, 1)))
 
 
+SHOWN = ["soleus_r", "med_gas_r", "tib_ant_r", "vas_lat_r", "rect_fem_r", "semimem_r", "glut_med1_r", "psoas_r"]
+REACTION = "hip_r_on_femur_r_in_femur_r_f"
+
+
+def draw(folder, times, pairs):
+    """pairs: title -> (ours, OpenSim's)."""
+    with open(os.path.join(folder, "static.dat"), "w") as file:
+        for k, t in enumerate(times):
+            file.write("%.3f %s\n" % (t, " ".join("%.1f %.1f" % (a[k], b[k]) for a, b in pairs.values())))
+    plots = "".join('set title "%s" noenhanced\nplot "static.dat" u 1:%d w l lw 2 lc rgb "#d95f02" t "OpenSim", "" u 1:%d w l lw 2 '
+                    'lc rgb "#1f77b4" t "Myohorizon"\nunset key\n' % (title, 2 * i + 3, 2 * i + 2)
+                    for i, title in enumerate(pairs))
+    with open(os.path.join(folder, "static.gp"), "w") as file:
+        file.write('set terminal svg size 1000,760 font "sans,11" background "white"\nset output "static.svg"\n'
+                   'set multiplot layout 4,3 margins 0.06,0.98,0.06,0.95 spacing 0.05,0.1\n'
+                   'set xrange [0.5:1.95]\nset xtics 0.5\nset tics font ",9"\nset key top left samplen 1.5\n' + plots + "unset multiplot\n")
+    subprocess.check_call(["gnuplot", "static.gp"], cwd=folder)
+
+
+def static(runs, folder):
+    folder = os.path.join(folder, "reactions")
+    angles = os.path.join(runs.work, "angles.sto")
+    every_tenth(os.path.join(folder, "subject01_walk1_Kinematics.sto"), angles, False)
+    with_muscles = [n for n in LEGS] + ["subtalar_angle_r", "subtalar_angle_l"] + NO_MUSCLE[6:9]
+    out, summary = run(runs, "static", "model: {file: %s, unsupported: warn, locked_at: {mtp_angle_r: 0, mtp_angle_l: 0}}\n"
+                       "muscle: {passive: 0}\ndata: {angles: %s, rates: true, external_loads: %s}\noutput: {reactions: child}\n"
+                       "costs:\n" % (os.path.join(folder, "subject01_simbody_adjusted_StaticOp.osim"), angles,
+                                     os.path.join(folder, "foot_floor_loads.xml")) +
+                       TRACK % "q, sigma: 0.001" + TRACK % "qdot, sigma: 0.02" + TRACK % "activation, value: [0], sigma: 0.3" +
+                       TRACK % ("residual_torque, value: [0], sigma: 1000, of: [%s]" % ", ".join(NO_MUSCLE[:6])) +
+                       TRACK % ("residual_torque, value: [0], sigma: 1, of: [%s]" % ", ".join(with_muscles)))
+    runs.expect("static: windows not converged", 1 - summary["converged"], 0.01)
+    own = table(os.path.join(out, "forces.sto"))
+    other = table(os.path.join(folder, "reference_subject01_StaticOptimization_force.sto"))
+    inner = [k for k, t in enumerate(own["time"]) if 0.55 <= t <= 1.9]
+    times, squares, largest, pairs = [own["time"][k] for k in inner], [], 0, {}
+    for name in own:
+        if name == "time":
+            continue
+        a, b = [own[name][k] for k in inner], [at(t, other["time"], other[name]) for t in times]
+        squares.append(sum((x - y)**2 for x, y in zip(a, b)) / len(a))
+        largest = max(largest, max(b))
+        if name in SHOWN:
+            pairs[name + ", N"] = a, b
+            print("static: %s RMS %.0f N of a peak of %.0f N, correlation %.3f" % (
+                name, math.sqrt(squares[-1]), max(b), correlation(a, b)))
+    runs.expect("static: forces of %d muscles, RMS of the largest of %.0f N" % (len(squares), largest),
+                math.sqrt(sum(squares) / len(squares)) / largest, 0.02)
+    own = table(os.path.join(out, "reactions.sto"))
+    other = table(os.path.join(folder, "reference_subject01_JointReaction_ReactionLoads.sto"))
+    for axis in "xyz":
+        column = next(n for n in other if n.endswith(REACTION + axis))
+        a, b = [own[REACTION + axis][k] for k in inner], [at(t, other["time"], other[column]) for t in times]
+        peak = max(abs(x) for x in b)
+        runs.expect("static: reaction of hip_r, %s, RMS of its peak of %.0f N" % (axis, peak),
+                    rms([x - y for x, y in zip(a, b)]) / peak, 0.05)
+        pairs["hip_r on femur_r, %s, N" % axis] = a, b
+    if len(sys.argv) > 5:
+        draw(runs.work, times, pairs)
+
+
 def main():
     what, arguments, keep = sys.argv[1], sys.argv[2:5], sys.argv[5:]
     shared = os.environ.get("MHE_SHARED", os.path.join(arguments[2], "..", "shared"))
@@ -213,7 +277,7 @@ def main():
         return 77
     with tempfile.TemporaryDirectory() as work:
         runs = Runs(arguments, keep[0] if keep else work)
-        {"gait2392": gait2392, "walk3d": walk3d}[what](runs, folder)
+        {"gait2392": gait2392, "walk3d": walk3d, "static": static}[what](runs, folder)
     return 0 if runs.good else 1
 
 

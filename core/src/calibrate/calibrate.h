@@ -36,7 +36,7 @@ typedef struct mhi_motion {
 } mhi_motion;
 
 typedef struct mhi_calibration {
-    const mhi_run *run;
+    const mhi_run *run, *start;
     mhi_plan plan;
     const mhe_host *host;
     mhe_description *model; /* as it is in the file */
@@ -55,9 +55,10 @@ typedef struct mhi_calibration {
     mhi_arena arena;
 } mhi_calibration;
 
-/* Reads everything; `run` and `host` lent. MHE_E_CONFIG, MHE_E_INPUT: one line. [cold] */
-mhe_status mhi_calibration_open(mhi_run *run, const mhe_host *host, mhi_calibration *calibration,
-                                mhe_error *err);
+/* Reads everything; `run`, `start` and `host` lent. `start`: the same config with costs that find a
+ * motion with a model that is wrong. MHE_E_CONFIG, MHE_E_INPUT: one line. [cold] */
+mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_host *host,
+                                mhi_calibration *calibration, mhe_error *err);
 void mhi_calibration_close(mhi_calibration *calibration);
 /* Finds the parameters and how well they are known. [cold] */
 mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);

@@ -50,7 +50,7 @@ typedef struct mhi_plan {
     double noise_time; /* s that the noise of measurements is alike */
     int32_t solver;    /* 0: mhe.solver.rti, 1: mhe.solver.ipopt */
     int32_t max_iterations;
-    double tolerance;
+    double tolerance; /* of the objective, relative */
 } mhi_plan;
 
 /* Of the tree that `run` was read from; lists live in its arena. MHE_E_CONFIG: one line. [cold] */

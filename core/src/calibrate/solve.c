@@ -231,6 +231,27 @@ static mhe_status take_solution(mhi_calibration *c, problem *p, mhe_error *err) 
     return MHE_OK;
 }
 
+/* Bounds of a node. Activations follow excitations that have bounds, so that behind a first node
+ * their own say nothing new, and cost a program most of its search for those that hold. */
+static void set_bounds(const mhi_calibration *c, const mhe_layout *layout, int32_t k,
+                       mhi_ocp *ocp) {
+    int32_t is_first = 0;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        is_first |= c->motions[i].first == k;
+    }
+    const mhe_block *a = mhe_layout_find(layout, MHE_ROLE_STATE, "activation");
+    double *lower = mhi_ocp_x_lower(ocp, k), *upper = mhi_ocp_x_upper(ocp, k);
+    mhi_layout_bounds(layout, MHE_ROLE_STATE, lower, upper);
+    for (int32_t i = 0; a != NULL && i < a->count && !is_first; i++) {
+        lower[a->first + i] = -INFINITY;
+        upper[a->first + i] = INFINITY;
+    }
+    if (k < c->n_intervals) {
+        mhi_layout_bounds(layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(ocp, k),
+                          mhi_ocp_u_upper(ocp, k));
+    }
+}
+
 /* Targets, bounds and the start. */
 static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_stage_problem *f = mhi_ocp_face(p->ocp);
@@ -238,12 +259,7 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
     mhi_junction junction;
     mhe_status status = take_solution(c, p, err);
     for (int32_t k = 0; k <= f->n_intervals && status == MHE_OK; k++) {
-        mhi_layout_bounds(layout, MHE_ROLE_STATE, mhi_ocp_x_lower(p->ocp, k),
-                          mhi_ocp_x_upper(p->ocp, k));
-        if (k < f->n_intervals) {
-            mhi_layout_bounds(layout, MHE_ROLE_CONTROL, mhi_ocp_u_lower(p->ocp, k),
-                              mhi_ocp_u_upper(p->ocp, k));
-        }
+        set_bounds(c, layout, k, p->ocp);
     }
     for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
         const mhi_motion *m = &c->motions[i];
@@ -305,14 +321,25 @@ static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
 typedef struct counter {
     mhi_calibration *c;
     int32_t done, limit; /* iterations before this solve; of this solve, at most */
+    double last;         /* objective of the iteration before */
+    int32_t still;       /* iterations in a row that changed it by less than the tolerance */
 } counter;
 
+#define STILL 2         /* of those, and it has come to rest */
+#define NEARLY_MET 0.05 /* largest violation of the optimality conditions there */
+
 static int32_t count(void *data, int32_t iteration, double objective, double kkt) {
-    const counter *n = data;
+    counter *n = data;
     const mhi_calibration *c = n->c;
+    if (iteration > 0) {
+        const int32_t rests = fabs(n->last - objective) <= c->plan.tolerance * objective;
+        n->still = rests && kkt < NEARLY_MET ? n->still + 1 : 0;
+    }
+    n->last = objective;
     const int32_t stop = c->progress != NULL && iteration > 0 &&
                          c->progress(c->data, n->done + iteration, objective, kkt);
-    return stop || iteration >= n->limit || n->done + iteration >= c->plan.max_iterations;
+    return stop || n->still >= STILL || iteration >= n->limit ||
+           n->done + iteration >= c->plan.max_iterations;
 }
 
 /* Bounds of the region about p; 1: p itself is at one that is no bound of the parameter's. */
@@ -366,11 +393,12 @@ static mhe_status find_solution(mhi_calibration *c, problem *p, mhe_error *err) 
     if (status == MHE_OK) { /* without a region */
         set_region(c, p, INFINITY, lower, upper);
         n.limit = c->plan.max_iterations;
+        n.still = 0;
         status = p->solver->solve(p->self, &control, &p->s, &c->info, err);
         c->info.iterations += n.done;
     }
     if (status == MHE_OK && c->info.outcome == MHE_SOLVE_INTERRUPTED) {
-        c->info.outcome = MHE_SOLVE_ITERATION_LIMIT;
+        c->info.outcome = n.still >= STILL ? MHE_SOLVE_CONVERGED : MHE_SOLVE_ITERATION_LIMIT;
     }
     return status;
 }
@@ -403,9 +431,9 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     return status;
 }
 
-mhe_status mhi_calibration_open(mhi_run *run, const mhe_host *host, mhi_calibration *c,
-                                mhe_error *err) {
-    *c = (mhi_calibration){.run = run, .host = host};
+mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_host *host,
+                                mhi_calibration *c, mhe_error *err) {
+    *c = (mhi_calibration){.run = run, .start = start, .host = host};
     mhe_status status = mhi_plan_read(run, &c->plan, err);
     if (status == MHE_OK) {
         status = mhi_estimator_read_model(run, host, &c->model, err);

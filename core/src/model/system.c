@@ -260,7 +260,9 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
         status = muscles(c, at, derivatives, rates, err);
     }
     if (status == MHE_OK && c->system->n_forces > 0) {
-        mhi_path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
+        if (c->system->n_paths > face->n_m) {
+            mhi_path_velocities(c, face->n_m, c->system->n_paths, at->v, derivatives);
+        }
         status = mhi_forces_evaluate(c, at, derivatives, err);
     }
     if (status == MHE_OK && c->system->n_actuators > 0) {

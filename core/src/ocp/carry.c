@@ -108,6 +108,11 @@ mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double
     return status;
 }
 
+mhe_status mhi_ocp_carry_on(const mhi_ocp *ocp, mhi_ocp_worker *w, const double *x, const double *u,
+                            double *x_next, mhe_error *err) {
+    return ocp->signals.n_carried > 0 ? carry(ocp, w, x, u, x_next, NULL, NULL, err) : MHE_OK;
+}
+
 void mhi_ocp_set_begins(mhi_ocp *ocp, int32_t begins) {
     ocp->begins = begins;
     for (int32_t i = ocp->n_x; i < ocp->face.n_x; i++) {

@@ -48,7 +48,11 @@ static void mirror(const mhi_ocp *ocp, const double *hessian, int32_t n_z, int32
 static void clear(const mhi_ocp *ocp, int32_t n_z, double *hessian) {
     for (int32_t i = 0; i < n_z; i++) {
         const int32_t reach = ocp->reach[i];
-        memset(hessian + i * n_z + reach, 0, sizeof(double) * (size_t)(i - reach + 1));
+        if (reach == i) { /* as most of muscles: no call */
+            hessian[i * n_z + i] = 0;
+        } else {
+            memset(hessian + i * n_z + reach, 0, sizeof(double) * (size_t)(i - reach + 1));
+        }
     }
 }
 
@@ -436,6 +440,17 @@ mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const doubl
     const mhe_status status = mhi_ocp_step(ocp, &ocp->workers[0], k, NULL, x, u, &out, err);
     mhi_system_context_settle(ocp->workers[0].system);
     return status;
+}
+
+mhe_status mhi_ocp_extend(mhi_ocp *ocp, int32_t k, const double *x, const double *u, double *x_next,
+                          mhe_error *err) {
+    mhi_ocp_worker *w = &ocp->workers[0];
+    if (ocp->memory_size == 0) {
+        return mhi_ocp_predict(ocp, k, x, u, x_next, err);
+    }
+    mhe_status status = mhi_ocp_linearise(ocp, k, x, u, x_next, w->A, w->B, err);
+    w->linearised = 0;
+    return status == MHE_OK ? mhi_ocp_carry_on(ocp, w, x, u, x_next, err) : status;
 }
 
 int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {

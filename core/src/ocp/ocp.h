@@ -104,6 +104,10 @@ void mhi_ocp_set_prior_at(mhi_ocp *ocp, int32_t k, const double *centre, const d
 /* x_next = F(x, u) over interval k by worker 0. */
 mhe_status mhi_ocp_predict(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                            double *x_next, mhe_error *err);
+/* The same over the last interval, which is to be linearised at x and u next: the integrator's
+ * memory keeps what it finds, and where it has one that next call has little left to do. */
+mhe_status mhi_ocp_extend(mhi_ocp *ocp, int32_t k, const double *x, const double *u, double *x_next,
+                          mhe_error *err);
 /* The same of interval k with A [n_x x n_x] and B [n_x x n_u], of the system alone. */
 mhe_status mhi_ocp_linearise(mhi_ocp *ocp, int32_t k, const double *x, const double *u,
                              double *x_next, double *A, double *B, mhe_error *err);

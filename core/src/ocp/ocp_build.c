@@ -133,8 +133,8 @@ static mhe_status create_worker(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err)
     const int32_t n_z = ocp->face.n_x + ocp->face.n_u;
     w->terms = MHI_TAKE(&ocp->arena, mhi_term_workspace, ocp->n_terms);
     w->y = MHI_TAKE(&ocp->arena, double, ocp->signals.n_y + ocp->signals.n_carried);
-    w->A = MHI_TAKE(&ocp->arena, double, ocp->signals.n_carried > 0 ? ocp->n_x * ocp->n_x : 0);
-    w->B = MHI_TAKE(&ocp->arena, double, ocp->signals.n_carried > 0 ? ocp->n_x * ocp->face.n_u : 0);
+    w->A = MHI_TAKE(&ocp->arena, double, ocp->n_x * ocp->n_x);
+    w->B = MHI_TAKE(&ocp->arena, double, ocp->n_x * ocp->face.n_u);
     w->jacobian = MHI_TAKE(&ocp->arena, double, ocp->signals.n_jacobian);
     w->gradient = MHI_TAKE(&ocp->arena, double, n_z);
     w->hessian = MHI_TAKE(&ocp->arena, double, n_z *n_z);

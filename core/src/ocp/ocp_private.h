@@ -14,7 +14,7 @@ typedef struct mhi_ocp_worker {
     mhi_term_workspace *terms;  /* [n_terms] */
     double *y, *jacobian;       /* of all signals */
     double *gradient, *hessian; /* [n_z], [n_z x n_z]; z = [x; u; m], see signals.h */
-    double *A, *B;              /* of the system alone, where something is carried; else NULL */
+    double *A, *B;              /* of the system alone */
     double *P;                  /* [n_x x n_p of the system], where parameters are estimated */
     double *room;               /* of mhi_parameters_measure */
     mhi_by_parameter *by;       /* [n_y] */
@@ -78,6 +78,9 @@ void mhi_ocp_read_carried(const mhi_ocp *ocp, int32_t k, const double *x, double
 mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double *memory,
                         const double *x, const double *u, const mhe_stage_values *out,
                         mhe_error *err);
+/* What of x_next is carried, behind the system's own. */
+mhe_status mhi_ocp_carry_on(const mhi_ocp *ocp, mhi_ocp_worker *w, const double *x, const double *u,
+                            double *x_next, mhe_error *err);
 /* Inputs of interval k [n_w]; NULL: there are none. */
 double *mhi_ocp_inputs_at(const mhi_ocp *ocp, int32_t k);
 
