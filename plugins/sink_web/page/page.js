@@ -64,7 +64,7 @@ function showMuscles() {
     const a = value(frame, "activation:" + i), e = value(frame, "emg:" + i), c = body.children[i].children;
     if (!c[1].firstElementChild) { const s = document.createElement("span"); s.className = "bar"; c[1].replaceChildren(s); c[1].style.width = "35%"; }
     c[1].firstElementChild.style.width = Math.max(0, Math.min(100, a)) + "%"; c[1].title = a.toFixed(0) + " %";
-    c[2].textContent = Number.isFinite(e) ? e.toFixed(0) + " %" : "\u2013"; c[3].textContent = value(frame, "force:" + i).toFixed(0);
+    c[2].textContent = Number.isFinite(e) ? e.toFixed(0) + " %" : "\u2013"; c[3].textContent = (Math.round(value(frame, "force:" + i)) + 0).toFixed(0);
   });
 }
 function showNumbers() {
