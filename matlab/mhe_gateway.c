@@ -270,6 +270,7 @@ static mxArray *estimate_out(const mhe_estimator_info *info, const mhe_estimate 
     add(out, "moment", vector_out(e->moment, info->n_q));
     add(out, "residual", vector_out(e->residual, info->n_residual_torques));
     add(out, "markers", matrix_out(e->markers, info->n_markers, 3));
+    add(out, "force_sd", vector_out(e->force_sd, info->n_muscles)); /* with output.uncertainty */
     return out;
 }
 

@@ -36,6 +36,29 @@ typedef struct words_option {
     int32_t mode; /* not 0: the program's `mode` becomes this */
 } words_option;
 
+/* Options that several programs have, in the same words: the field `at` of the program's struct,
+ * the commands `which` (0: all). `of`: what the keys are of, "config"; `is`: what the folder is
+ * for; `what`: what is not printed. */
+#define WORDS_SET(of, which, place)                                                      \
+    {                                                                                    \
+        .name = "--set", .value = "path.to.key=value",                                   \
+        .help = "replaces a key of the " of "; may be given often", .commands = (which), \
+        .kind = WORDS_LIST, .at = (place)                                                \
+    }
+#define WORDS_OUT(is, which, place)                                                             \
+    {                                                                                           \
+        .name = "--out", .value = "DIR", .help = (is), .commands = (which), .kind = WORDS_TEXT, \
+        .at = (place)                                                                           \
+    }
+#define WORDS_QUIET(what, place) \
+    { .name = "--quiet", .help = "no " what, .kind = WORDS_FLAG, .at = (place), .low = 1 }
+#define WORDS_TRUST(place)                                                                    \
+    {                                                                                         \
+        .name = "--trust",                                                                    \
+        .help = "the config may name folders of plugins (plugin_path), whose code then runs", \
+        .kind = WORDS_FLAG, .at = (place), .low = 1                                           \
+    }
+
 typedef struct words_command {
     const char *name;    /* "run"; "" of a program without commands */
     const char *operand; /* "CONFIG.yaml", what the command is about; NULL: none */

@@ -9,16 +9,9 @@ static const words_command commands[] = {
 #define AT(field) offsetof(arguments, field)
 
 static const words_option options[] = {
-    {.name = "--out",
-     .value = "DIR",
-     .help = "folder of bench.json and the picture rate.svg; ./out/<config name> unless given",
-     .kind = WORDS_TEXT,
-     .at = AT(out)},
-    {.name = "--set",
-     .value = "path.to.key=value",
-     .help = "replaces a key of the config; may be given often",
-     .kind = WORDS_LIST,
-     .at = AT(set)},
+    WORDS_OUT("folder of bench.json and the picture rate.svg; ./out/<config name> unless given", 0,
+              AT(out)),
+    WORDS_SET("config", 0, AT(set)),
     {.name = "--vary",
      .value = "path.to.key=v1,v2",
      .help = "multiplies the variants; the last one varies fastest, and ratios are to the first "

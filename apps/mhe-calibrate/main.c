@@ -26,17 +26,8 @@ static const words_command commands[] = {
      .most = 1}};
 
 static const words_option options[] = {
-    {.name = "--out",
-     .value = "DIR",
-     .help = "folder of the results; ./out/<config's name>-calibrated unless given",
-     .kind = WORDS_TEXT,
-     .at = AT(out)},
-    {.name = "--set",
-     .value = "path.to.key=value",
-     .help = "replaces a key of the config; may be given often",
-     .kind = WORDS_LIST,
-     .at = AT(set)},
-    {.name = "--quiet", .help = "no progress", .kind = WORDS_FLAG, .at = AT(quiet), .low = 1}};
+    WORDS_OUT("folder of the results; ./out/<config's name>-calibrated unless given", 0, AT(out)),
+    WORDS_SET("config", 0, AT(set)), WORDS_QUIET("progress", AT(quiet))};
 
 static const words_program program = {
     .name = "mhe-calibrate",

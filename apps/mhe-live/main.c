@@ -45,11 +45,7 @@ static const words_command commands[] = {
 #define AT(field) offsetof(arguments, field)
 
 static const words_option options[] = {
-    {.name = "--set",
-     .value = "path.to.key=value",
-     .help = "replaces a key of the config; may be given often",
-     .kind = WORDS_LIST,
-     .at = AT(set)},
+    WORDS_SET("config", 0, AT(set)),
     {.name = "--record",
      .value = "FILE.xdf",
      .help = "records everything that comes, so that the run can be repeated",
@@ -67,17 +63,10 @@ static const words_option options[] = {
      .kind = WORDS_OTHER,
      .at = AT(wait),
      .take = read_seconds},
-    {.name = "--out",
-     .value = "DIR",
-     .help = "folder of recordings, tables and maximal contractions; this one unless given",
-     .kind = WORDS_TEXT,
-     .at = AT(out)},
-    {.name = "--quiet", .help = "no summary", .kind = WORDS_FLAG, .at = AT(quiet), .low = 1},
-    {.name = "--trust",
-     .help = "the config may name folders of plugins (plugin_path), whose code then runs",
-     .kind = WORDS_FLAG,
-     .at = AT(trust),
-     .low = 1}};
+    WORDS_OUT("folder of recordings, tables and maximal contractions; this one unless given", 0,
+              AT(out)),
+    WORDS_QUIET("summary", AT(quiet)),
+    WORDS_TRUST(AT(trust))};
 
 static const words_program program = {
     .name = "mhe-live",

@@ -11,17 +11,9 @@ static const words_command commands[] = {
 #define AT(field) offsetof(arguments, field)
 
 static const words_option options[] = {
-    {.name = "--out",
-     .value = "DIR",
-     .help = "folder of the results; ./out/<config name> unless given",
-     .kind = WORDS_TEXT,
-     .at = AT(out)},
-    {.name = "--set",
-     .value = "path.to.key=value",
-     .help = "replaces a key of the config; may be given often",
-     .kind = WORDS_LIST,
-     .at = AT(set)},
-    {.name = "--quiet", .help = "no progress bar", .kind = WORDS_FLAG, .at = AT(quiet), .low = 1},
+    WORDS_OUT("folder of the results; ./out/<config name> unless given", 0, AT(out)),
+    WORDS_SET("config", 0, AT(set)),
+    WORDS_QUIET("progress bar", AT(quiet)),
     {.name = "--realtime",
      .help = "feeds the recorded frames by the clock, as they would come live: a frame that comes "
              "while "
@@ -33,11 +25,7 @@ static const words_option options[] = {
      .kind = WORDS_FLAG,
      .at = AT(realtime),
      .low = 1},
-    {.name = "--trust",
-     .help = "the config may name folders of plugins (plugin_path), whose code then runs",
-     .kind = WORDS_FLAG,
-     .at = AT(trust),
-     .low = 1},
+    WORDS_TRUST(AT(trust)),
     {.name = "--check",
      .value = "CONFIG.yaml",
      .help = "reads config, model and data, and estimates nothing",

@@ -12,7 +12,8 @@
 
 #define WIDTH 300.0
 #define HEIGHT 120.0
-#define POINTS 600 /* of a line; more would not be seen */
+#define POINTS 600   /* of a line; more would not be seen */
+#define PRINTED 1e-4 /* of the smallest axis: less is printed as 0 */
 
 static double value_at(const rows *t, int32_t row, int32_t column, double scale) {
     return scale * t->is.values[(ptrdiff_t)row * t->is.n_columns + column];
@@ -91,6 +92,11 @@ typedef struct quantity {
     const char *sd_prefix;
 } quantity;
 
+/* As it is printed: what is nothing beside the smallest axis is 0, not 2e-47. */
+static double printed(const quantity *q, double value) {
+    return fabs(value) < PRINTED * q->least ? 0 : value;
+}
+
 /* One small picture: a column, what was measured of it and what is true, where these are known. */
 static void add_panel(mhi_text *out, const quantity *q, const char *name, int32_t column) {
     const rows *t = q->table, *other = q->measured;
@@ -104,9 +110,6 @@ static void add_panel(mhi_text *out, const quantity *q, const char *name, int32_
     sd = sd >= 0 && q->sd->is.n_rows == t->is.n_rows ? sd : -1;
     double range[2] = {INFINITY, -INFINITY};
     widen(t, column, scale, range);
-    if (sd >= 0) {
-        widen_by_band(t, column, q->sd, sd, scale, range);
-    }
     widen(other, other_column, scale, range);
     widen(q->truth, truth, scale, range);
     if (!(range[0] <= range[1])) {
@@ -117,7 +120,10 @@ static void add_panel(mhi_text *out, const quantity *q, const char *name, int32_
     mhi_text_add(out,
                  " <small>%.3g to %.3g %s</small></figcaption><svg viewBox=\"0 -2 %g %g\" "
                  "role=\"img\">",
-                 range[0], range[1], q->unit, WIDTH, HEIGHT + 4);
+                 printed(q, range[0]), printed(q, range[1]), q->unit, WIDTH, HEIGHT + 4);
+    if (sd >= 0) { /* the axis alone, too */
+        widen_by_band(t, column, q->sd, sd, scale, range);
+    }
     if (range[1] - range[0] < q->least) { /* the axis alone: small changes stay small */
         const double middle = 0.5 * (range[0] + range[1]);
         const int grounded = range[0] >= 0 && middle < 0.5 * q->least;

@@ -31,11 +31,16 @@ static double number(const tracking *t, const char *key) {
     return value;
 }
 
+/* Of the time between frames, without a deadline: the rest is for the preparation of the next and
+ * for being late. */
+#define LIVE_SHARE 0.75
+
 /* What live use expects where the config leaves it open. */
 static mhe_status open_live(tracking *t, mhe_error *err) {
     const mhe_estimator_info *info = &t->summary.info;
     const double deadline = 1e-3 * number(t, "realtime.deadline_ms");
-    t->live.deadline = deadline > 0 ? deadline : info->ratio / t->summary.recording.rate;
+    t->live.deadline =
+        deadline > 0 ? deadline : LIVE_SHARE * info->ratio / t->summary.recording.rate;
     char *node = NULL;
     mhe_status status = mhe_estimator_set_deadline(t->estimator, t->live.deadline, err);
     if (status == MHE_OK) {

@@ -42,16 +42,8 @@ static mhe_status take_rate(const char *word, const char *value, void *target, m
 }
 
 static const words_option options[] = {
-    {.name = "--out",
-     .value = "DIR",
-     .help = "default ./out/<config name>; of a motion ./out/<config name>-sim",
-     .kind = WORDS_TEXT,
-     .at = AT(out)},
-    {.name = "--set",
-     .value = "path.to.key=value",
-     .help = "replaces a key of the config; may be given often",
-     .kind = WORDS_LIST,
-     .at = AT(set)},
+    WORDS_OUT("default ./out/<config name>; of a motion ./out/<config name>-sim", 0, AT(out)),
+    WORDS_SET("config", 0, AT(set)),
     {.name = "--input",
      .value = "FILE.sto",
      .help = "excitations to act with, or postures to go through",

@@ -26,18 +26,8 @@ static const words_command commands[] = {
 #define SUBMIT (1u << COMMAND_SUBMIT)
 
 static const words_option options[] = {
-    {.name = "--out",
-     .value = "DIR",
-     .help = "folder of the results; ./out/<study's name> unless given",
-     .commands = RUN | SUBMIT,
-     .kind = WORDS_TEXT,
-     .at = AT(out)},
-    {.name = "--set",
-     .value = "path.to.key=value",
-     .help = "replaces a key of the study; may be given often",
-     .commands = RUN | SUBMIT,
-     .kind = WORDS_LIST,
-     .at = AT(set)},
+    WORDS_OUT("folder of the results; ./out/<study's name> unless given", RUN | SUBMIT, AT(out)),
+    WORDS_SET("study", RUN | SUBMIT, AT(set)),
     {.name = "--workers",
      .value = "N",
      .help = "processes; as many as there are processors",
@@ -79,7 +69,7 @@ static const words_option options[] = {
      .commands = SUBMIT,
      .kind = WORDS_LIST,
      .at = AT(option)},
-    {.name = "--quiet", .help = "no progress bar", .kind = WORDS_FLAG, .at = AT(quiet), .low = 1}};
+    WORDS_QUIET("progress bar", AT(quiet))};
 
 const words_program arguments_program = {
     .name = "mhe-study",

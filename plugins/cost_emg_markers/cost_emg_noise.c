@@ -11,14 +11,18 @@
 #include <stdlib.h>
 
 struct emg_noise_config { /* standard deviations */
-    double markers, emg_spread, emg_value, emg_floor;
+    double markers, markers_misfit, emg_spread, emg_value, emg_floor;
     mhe_text_list tracked;
     double untracked, residual_torque, qdot;
 };
 
 static const mhe_option emg_noise_options[] = {
     MHE_OPT_REAL(struct emg_noise_config, markers, 0.001, 1e-6, 1, "m",
-                 "Standard deviation of a marker's coordinate."),
+                 "Least standard deviation of a marker's coordinate."),
+    MHE_OPT_REAL(
+        struct emg_noise_config, markers_misfit, 1, 0, 10, "1",
+        "The same as a share of how far all markers were from the estimates so far (RMS of "
+        "a coordinate); the larger counts."),
     MHE_OPT_REAL(
         struct emg_noise_config, emg_spread, 0.5, 0, 10, "1",
         "Standard deviation of EMG as a share of how much its channel varies (its standard "
@@ -129,7 +133,9 @@ static double emg_noise_sigma(const struct emg_noise *t, const mhe_stage *s, int
     switch (t->kind[i]) {
     case OF_MARKER:
         *target = measured;
-        return c->markers;
+        return s->y_spread == NULL || isnan(s->y_spread[i])
+                   ? c->markers
+                   : fmax(c->markers, c->markers_misfit * s->y_spread[i]);
     case OF_EMG:
         if (!isnan(measured)) {
             *target = measured;

@@ -28,11 +28,13 @@ static ground_load to_ground(const simbody_context *c, const mhe_load *load, con
                        .axes = link_of(c->tree, load->axes),
                        .origin = link_of(c->tree, load->origin)};
     double p[3];
-    bodies_pose(c, load->axes, out.axes_r, p);
     if (load->axes < 0) { /* as most are: ground's axes */
+        static const double one[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+        memcpy(out.axes_r, one, sizeof one);
         memcpy(out.f, value, sizeof out.f);
         memcpy(out.t, value + 6, sizeof out.t);
     } else {
+        bodies_pose(c, load->axes, out.axes_r, p);
         rotate3(out.axes_r, value, out.f);
         rotate3(out.axes_r, value + 6, out.t);
     }
@@ -58,18 +60,18 @@ static int carries(const tree *t, int32_t j, int32_t i) {
     return i == j;
 }
 
-/* Change of the load's spatial force when joint j turns. */
-static void force_change(const simbody_context *c, const ground_load *load, int32_t j,
-                         double *out) {
-    const double *axis = c->links[j].axis;
+/* Change of the load's spatial force when a joint turns about `axis`, which carries the load's
+ * axes, and its origin, or not. */
+static void force_change(const ground_load *load, const double *axis, int with_axes,
+                         int with_origin, double *out) {
     double change[3], moment[3];
     memset(out, 0, 6 * sizeof *out);
-    if (carries(c->tree, j, load->axes)) {
+    if (with_axes) {
         cross3(axis, load->f, change);
         cross3(axis, load->t, moment);
         spatial(change, load->x, moment, out);
     }
-    if (carries(c->tree, j, load->origin)) {
+    if (with_origin) {
         cross3(axis, load->x, change);
         add3(change, 1, axis + 3);
         cross3(change, load->f, moment);
@@ -93,12 +95,15 @@ static void add_derivative(const simbody_context *c, const ground_load *load, co
                            double *tau_q) {
     const tree *t = c->tree;
     for (int32_t j = 0; j < t->n_joints; j++) {
-        const int32_t below = carries(t, j, load->link), column = t->joints[j].coordinate;
-        if (!below && !carries(t, j, load->axes) && !carries(t, j, load->origin)) {
+        const int below = carries(t, j, load->link);
+        const int with_axes = load->axes >= 0 && carries(t, j, load->axes);
+        const int with_origin = load->origin == load->link ? below : carries(t, j, load->origin);
+        const int32_t column = t->joints[j].coordinate;
+        if (!below && !with_axes && !with_origin) {
             continue;
         }
         double change[6], turned[6];
-        force_change(c, load, j, change);
+        force_change(load, c->links[j].axis, with_axes, with_origin, change);
         cross_force(c->links[j].axis, force, turned);
         for (int k = 0; k < 6; k++) {
             turned[k] = change[k] - turned[k];
@@ -112,7 +117,7 @@ static void add_derivative(const simbody_context *c, const ground_load *load, co
             tau_q[t->joints[i].coordinate * t->n_q + column] +=
                 c->slopes[4 * i + 1] * dot6(c->links[i].axis, change) * c->slopes[4 * j + 1];
         }
-        if (below) { /* the function's own slope */
+        if (below && c->slopes[4 * j + 2] != 0) { /* the function's own slope */
             tau_q[column * t->n_q + column] += c->slopes[4 * j + 2] * dot6(c->links[j].axis, force);
         }
     }

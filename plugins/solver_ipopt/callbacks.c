@@ -5,6 +5,10 @@
 
 #include <math.h>
 
+/* What an iteration is beside a solution by recursions (mhe_solve_control.spent): a sparse
+ * factorisation and its solutions. */
+#define SOLUTIONS 40
+
 /* A replay knows of each evaluation whether the clock broke it off: it is asked before. */
 static int32_t evaluate(ipopt_solver *s, const compat_number *v, int32_t level) {
     if (s->control != NULL && s->control->late != NULL) {
@@ -125,7 +129,8 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
         control->progress(control->data, iteration, objective, s->kkt_residual)) {
         s->stopped = MHE_SOLVE_INTERRUPTED;
     } else if (control != NULL &&
-               (is_late(s) || (control->spent != NULL && control->spent(control->budget, 1)))) {
+               (is_late(s) ||
+                (control->spent != NULL && control->spent(control->budget, SOLUTIONS)))) {
         s->stopped = MHE_SOLVE_DEADLINE;
     }
     return s->stopped == 0 && s->nlp.failure == MHE_OK;

@@ -121,6 +121,7 @@ static int32_t update(const chain *c, double crossed, double pulled) {
 void active_follow(qp *q, int32_t j, double crossed, double pulled) {
     const chain c = open(q, j);
     for (int32_t i = 0; i < 3 * q->shape->N + 8; i++) {
+        q->sweeps++;
         sweep_back(&c);
         sweep_forward(&c);
         if (update(&c, crossed, pulled) == 0) {

@@ -184,6 +184,7 @@ static void refine(qp *q) {
         q->rest_w[at] = q->rhs[at] + q->diagonal[at] * q->dw[at];
     }
     qp_sum_p(s, q->stages, q->dw, q->dlambda, row_p(s, q->rest_w));
+    q->solutions++; /* what is left takes about as long as a solution */
     qp_newton(q, q->rest_w, q->rest_x, q->fix_w, q->fix_lambda);
     for (size_t i = 0; i < size_z(s); i++) {
         q->dw[i] += q->fix_w[i];

@@ -6,6 +6,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <time.h>
+#include <unistd.h>
 
 #define OPEN 0x40000000 /* in `inside`: threads may join the loop */
 #define PAUSES 32       /* between looks at the clock */
@@ -31,6 +32,7 @@ struct rti_pool {
     pthread_mutex_t mutex;
     pthread_cond_t wake, done;
     double spin;
+    pid_t process; /* after fork() a child has the memory, but no thread but its own */
     int32_t n_threads;
     pool_thread threads[];
 };
@@ -149,6 +151,7 @@ rti_pool *rti_pool_create(int32_t n_workers, double spin) {
         return NULL;
     }
     p->spin = spin;
+    p->process = getpid();
     (void)pthread_mutex_init(&p->mutex, NULL);
     (void)pthread_cond_init(&p->wake, NULL);
     (void)pthread_cond_init(&p->done, NULL);
@@ -167,7 +170,8 @@ rti_pool *rti_pool_create(int32_t n_workers, double spin) {
 }
 
 void rti_pool_destroy(rti_pool *p) {
-    if (p == NULL) {
+    if (p == NULL || p->process != getpid()) {
+        free(p);
         return;
     }
     atomic_store(&p->ends, 1);
@@ -184,7 +188,7 @@ void rti_pool_destroy(rti_pool *p) {
 
 void rti_pool_run(rti_pool *p, int32_t n_items,
                   int32_t (*work)(void *data, int32_t worker, int32_t item), void *data) {
-    if (p == NULL) {
+    if (p == NULL || p->process != getpid()) {
         for (int32_t i = 0; i < n_items && work(data, 0, i) == 0; i++) {
         }
         return;

@@ -68,6 +68,9 @@ typedef struct qp {
     uint8_t *turned;  /* [n_x] simple states with bounds, or a control with bounds, that changed */
     int32_t programs; /* solved since qp_place(), and those of them in which no set was found */
     int32_t fallbacks;
+    /* Of Newton systems, with what their factors take, since that was told (qp_take_work()); and
+     * sweeps along chains, many of which make one. */
+    int32_t solutions, sweeps;
     int32_t skipped, to_skip; /* programs after one whose sets cycled: twice as many each time */
     struct qp_border *border; /* of the parameters (border.c); NULL where there are none */
 } qp;
@@ -109,6 +112,8 @@ void border_answers(qp *q);
 void qp_use(qp *q, int32_t recursion);
 /* Factorises H + diag(q->diagonal) with what is `held` [size_z]; solves with g, b (riccati.h). */
 int32_t qp_factor(qp *q, const uint8_t *held);
+/* In solutions, since it was last asked. */
+int32_t qp_take_work(qp *q);
 void qp_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
 /* Where the first state is fixed and costs allow it: on covariances. */
 int32_t qp_best(const qp *q);

@@ -129,7 +129,7 @@ static double worst(const rti_residuals *r) {
 }
 
 /* Why to stop before the next iteration: MHE_SOLVE_*, -1: not at all. */
-static int32_t verdict(const rti_solver *s, const mhe_solve_control *control, int32_t iteration,
+static int32_t verdict(rti_solver *s, const mhe_solve_control *control, int32_t iteration,
                        int32_t limit) {
     const int32_t stop =
         control != NULL && control->progress != NULL &&
@@ -144,7 +144,7 @@ static int32_t verdict(const rti_solver *s, const mhe_solve_control *control, in
         return MHE_SOLVE_ITERATION_LIMIT;
     }
     /* The next iteration will take about as long as the last one. */
-    if (rti_is_late(s, s->iteration_time) || rti_is_spent(s, 0)) {
+    if (rti_is_late(s, s->iteration_time) || rti_is_spent(s)) {
         return MHE_SOLVE_DEADLINE;
     }
     return -1;

@@ -16,9 +16,10 @@
 /* Part of the least residual so far that a step may leave, whatever its merit. */
 #define NEARER 0.5
 
-int32_t rti_is_spent(const rti_solver *s, int32_t steps) {
+int32_t rti_is_spent(rti_solver *s) {
     const mhe_solve_control *control = s->control;
-    return control != NULL && control->spent != NULL && control->spent(control->budget, steps);
+    const int32_t solutions = qp_take_work(&s->qp);
+    return control != NULL && control->spent != NULL && control->spent(control->budget, solutions);
 }
 
 int32_t rti_is_late(const rti_solver *s, double seconds) {
@@ -28,13 +29,10 @@ int32_t rti_is_late(const rti_solver *s, double seconds) {
                : isfinite(s->deadline) && rti_now() + seconds >= s->deadline;
 }
 
-static int32_t is_over(const rti_solver *s, int32_t steps) {
-    return rti_is_spent(s, steps) || rti_is_late(s, 0);
-}
-
-/* Before each interior-point step. */
+/* Before each iteration of a program, too. */
 static int32_t is_late(const void *data) {
-    return is_over(data, 1);
+    rti_solver *s = (rti_solver *)data; /* whose count of solutions is told */
+    return rti_is_spent(s) || rti_is_late(s, 0);
 }
 
 /* How far from its limits the program of a whole recording may stay while the iterate is far from
@@ -265,7 +263,7 @@ int32_t rti_step_full(rti_solver *s) {
         if (s->failure != MHE_OK) {
             break;
         }
-        if (is_over(s, 0)) {
+        if (is_late(s)) {
             return RTI_LATE;
         }
     }
@@ -378,7 +376,7 @@ static double search(rti_solver *s, double slope) {
         if (rti_evaluate(s, &s->trial, RTI_DYNAMICS | RTI_COSTS) && is_better(s, length, slope)) {
             return rti_evaluate(s, &s->trial, RTI_ALL) ? length : 0;
         }
-        if (s->failure != MHE_OK || is_over(s, 0)) {
+        if (s->failure != MHE_OK || is_late(s)) {
             return 0;
         }
     }
@@ -402,10 +400,10 @@ static double try_step(rti_solver *s, int32_t result) {
     if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
         return 1;
     }
-    if (known && result == QP_SOLVED && !is_over(s, 0) && second_look(s, slope)) {
+    if (known && result == QP_SOLVED && !is_late(s) && second_look(s, slope)) {
         return 1;
     }
-    return s->failure == MHE_OK && !is_over(s, 0) ? search(s, slope) : 0;
+    return s->failure == MHE_OK && !is_late(s) ? search(s, slope) : 0;
 }
 
 int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
@@ -426,7 +424,7 @@ int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
         if (s->failure != MHE_OK) {
             break;
         }
-        if (is_over(s, 0)) {
+        if (is_late(s)) {
             return RTI_LATE;
         }
         if (result == QP_INFEASIBLE) {

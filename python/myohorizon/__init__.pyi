@@ -44,6 +44,10 @@ class Estimate(Mapping[str, _Array]):
     moment: _Array
     residual: _Array
     markers: _Array
+    q_sd: _Array
+    activation_sd: _Array
+    force_sd: _Array
+    moment_sd: _Array
     time: float
     iterations: int
     kkt_residual: float

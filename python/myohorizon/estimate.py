@@ -11,7 +11,8 @@ PHASE = ("empty", "filling", "beginning", "settling", "running")
 
 # Quantities of an estimate with their units, in the order of its numbers.
 UNITS = {"q": "rad (m)", "qdot": "rad/s (m/s)", "activation": "1", "excitation": "1", "force": "N",
-         "moment": "N m (N)", "residual": "N m (N)", "markers": "m"}
+         "moment": "N m (N)", "residual": "N m (N)", "markers": "m",
+         "q_sd": "rad (m)", "activation_sd": "1", "force_sd": "N", "moment_sd": "N m (N)"}
 
 
 class Shape:
@@ -29,6 +30,8 @@ class Shape:
             sizes["residual"] = info.n_residual_torques
         if info.n_markers > 0:
             sizes["markers"] = 3 * info.n_markers
+        if info.uncertainty:
+            sizes.update(q_sd=n_q, activation_sd=n_m, force_sd=n_m, moment_sd=n_q)
         self.places = {}
         self.size = 0
         for name in UNITS:
@@ -49,7 +52,7 @@ class Shape:
         """Names of the numbers of a quantity: coordinates, muscles, markers."""
         if name not in self.places:
             raise KeyError(f"an estimate has no {name!r}; it has {', '.join(self.places)}")
-        if name in ("q", "qdot", "moment"):
+        if name in ("q", "qdot", "moment", "q_sd", "moment_sd"):
             return self.coordinates
         if name == "markers":
             return self.markers
@@ -85,6 +88,8 @@ class Estimate(Mapping):
     ``moment``      [n_coordinates]      N m     joint moments by the muscles (N)
     ``residual``    [n_residual]         N m     residual torques, where switched on (N)
     ``markers``     [n_markers, 3]       m       positions in the ground frame of the model
+    ``q_sd`` ..                                  standard deviations of ``q``, ``activation``, ``force``, ``moment``, where
+                                                 ``output.uncertainty`` is on
     ==============  ===================  ======  ==========================================================
 
     Arrays are the estimate's own. Beside them, as plain numbers: ``time`` (s, of the moment that is estimated),

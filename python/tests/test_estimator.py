@@ -46,6 +46,15 @@ def test_an_estimate_has_names_units_and_copies():
             last.forces
 
 
+def test_standard_deviations_come_where_they_are_asked_for():
+    frames = demo_frames(60)
+    plain, sure = estimates(frames), estimates(frames, **{"output.uncertainty": True})
+    assert "force_sd" not in plain[-1] and np.array_equal(plain[-1].force, sure[-1].force)
+    assert sure[-1].force_sd.shape == (19,) and (sure[-1].force_sd > 0).all()
+    assert sure[-1].q_sd.shape == (4,) and np.isfinite(sure[-1].moment_sd).all()
+    assert sure[-1].labels("activation_sd") == sure[-1].labels("force")
+
+
 def test_the_bits_are_those_of_c(tmp_path):
     """examples/stream with every digit, built against the same library."""
     source = (SOURCE / "examples/stream/stream.c").read_text()

@@ -269,7 +269,9 @@ if [ -d "$shared" ]; then
     read_right simm-degrees 0.005 'angles are taken as degrees'
     read_right near-name 0.005 'left out: KNE.M, ANK.M' 'no column for marker WRI.M'
     read_right dropped-frames 0.005 '0.12 s without frames after 0.14 s: begins again there'
+    ! grep -q 'taken as even' dropped-frames.err || fail "dropped-frames: taken as even"
     read_right zeros-missing 0.005 '40 samples of a marker at exactly 0 0 0'
+    ! grep -q 'check the place' zeros-missing.txt || fail "zeros-missing: a marker is to be moved: $(cat zeros-missing.txt)"
     read_right trc-unlabelled 0.005 'what is beyond is left out'
     read_right trc-cut-rows 0.005 'the rest is taken as missing'
     read_right trc-time-2-decimals 0.005 'taken as even at 240 Hz'
@@ -283,6 +285,7 @@ if [ -d "$shared" ]; then
     verdict lab-origin no 'all markers are off by the same 0.300 0.150 -0.200 m' 'data.transform: {shift: [-0.300, -0.150, 0.200]}'
     remedied lab-origin 'transform: {shift: [-0.3, -0.15, 0.2]}'
     verdict left-handed-joint no 'mirrored'
+    grep -q "left-handed-joint.bioMod:3: the frame of body 'fore' is left-handed" left-handed-joint.err || fail "left-handed-joint: no line"
     refused degrees-unsaid "degrees-unsaid.mot:7: 'flex' goes from 28.6" 'its range is -0.2 to 2.6 rad' 'inDegrees=yes'
     refused emg-percent 'emg-percent.sto: values from' 'percent?'
     refused two-subjects 'two subjects (A, B) have marker ELB.L'

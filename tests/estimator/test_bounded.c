@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Frames that no motion fits: none of them takes more than ten times the work of a usual one.
  *
- * Work is counted (model/work.h), not timed, so that the bound holds on any machine; run with
- * --times, processor time is printed beside it. */
+ * Work is counted (model/work.h), not timed, so that the bound holds on any machine. A unit of hard
+ * frames takes up to 1.12 times as long as one of usual frames: hence 8.9 in units for ten in
+ * processor time. With --times REPEATS that is printed beside it: a frame's least of so many runs,
+ * which all do the same work, since what else the machine does counts into a single one. */
 #include "base/clock.h"
 #include "estimator/estimator_private.h"
 #include "estimator/recording.h"
@@ -16,9 +18,9 @@
 
 #define FROM 60 /* frame at which a kind begins */
 #define FRAMES 220
-#define MOST 10.0 /* usual frames */
+#define MOST 8.9 /* usual frames */
 
-static int print_times;
+static int repeats; /* of each kind, for times; 0: none are printed */
 
 typedef struct frame_data {
     double *markers, *emg;
@@ -193,8 +195,9 @@ static double processor_ms(void) {
     return 1e3 * (double)clock() / CLOCKS_PER_SEC;
 }
 
-/* The estimator's own count of a push and of the preparation before it. */
-static tally count(const char *yaml, size_t kind) {
+/* The estimator's own count of a push and of the preparation before it; `least` [FRAMES]: ms of
+ * each push, where that is less than what stands there. */
+static tally count(const char *yaml, size_t kind, double *least) {
     test_fixture f;
     mhi_recording *r = NULL;
     if (test_fixture_open(&f, yaml) != MHE_OK) {
@@ -238,7 +241,7 @@ static tally count(const char *yaml, size_t kind) {
             t.worst = units;
             t.at = k;
         }
-        t.worst_ms = k >= FROM ? fmax(t.worst_ms, took) : 0;
+        least[k] = fmin(least[k], took);
     }
     assert_true(n_usual > 30);
     qsort(usual, (size_t)n_usual, sizeof *usual, by_value);
@@ -265,8 +268,16 @@ static void no_frame_takes_much_more(void **state) {
                        "costs: [mhe.cost.emg-markers-high]\nsolver: %s\n",
                        MHE_TEST_SOURCE_DIR, MHE_TEST_SOURCE_DIR, solvers[s]);
         for (size_t kind = 0; kind < N_KINDS; kind++) {
-            const tally t = count(yaml, kind);
-            if (print_times) {
+            double least[FRAMES];
+            all(least, FRAMES, INFINITY);
+            tally t = count(yaml, kind, least);
+            for (int i = 1; i < repeats; i++) {
+                t.usual_ms = fmin(t.usual_ms, count(yaml, kind, least).usual_ms);
+            }
+            for (int32_t k = FROM; k < FRAMES; k++) {
+                t.worst_ms = fmax(t.worst_ms, least[k]);
+            }
+            if (repeats > 0) {
                 print_message("| %s | %s | %.0f | %.1f (frame %d) | %.2f ms | %.1f |\n", solvers[s],
                               kinds[kind].name, t.usual, t.worst / t.usual, (int)t.at, t.usual_ms,
                               t.worst_ms / t.usual_ms);
@@ -283,6 +294,6 @@ static void no_frame_takes_much_more(void **state) {
 
 int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(no_frame_takes_much_more)};
-    print_times = argc > 1 && strcmp(argv[1], "--times") == 0;
+    repeats = argc > 2 && strcmp(argv[1], "--times") == 0 ? atoi(argv[2]) : 0;
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -73,6 +73,18 @@ static void change_number(void) {
     replace(at, n, with, strlen(with));
 }
 
+/* Another number, so that the file can still be read. */
+static void change_digits(void) {
+    size_t n;
+    const size_t at = number_at(&n);
+    for (size_t i = at; i < at + n; i++) {
+        text[i] = isdigit((unsigned char)text[i]) ? (char)('0' + any(10)) : text[i];
+    }
+    if (n > 0 && any(4) == 0) { /* ten times as large */
+        replace(at, 0, "7", 1);
+    }
+}
+
 static void change_bytes(void) {
     const uint32_t n = 1 + any(4);
     for (uint32_t i = 0; i < n; i++) {
@@ -124,8 +136,10 @@ static void exchange_words(void) {
 
 int main(int argc, char **argv) {
     static void (*const kinds[])(void) = {
-        change_number, change_number, change_number, change_number, change_bytes,   double_line,
-        cut_line,      cut_end,       cut_piece,     insert_word,   exchange_words, exchange_words};
+        change_number, change_number, change_digits, change_digits,  change_digits,  change_digits,
+        change_digits, change_digits, change_digits, change_digits,  change_digits,  change_digits,
+        change_bytes,  double_line,   cut_line,      cut_end,        cut_piece,      insert_word,
+        insert_word,   double_line,   cut_line,      exchange_words, exchange_words, change_bytes};
     FILE *in = argc == 4 ? fopen(argv[1], "rb") : NULL;
     text = malloc(LARGEST);
     if (in == NULL || text == NULL) {

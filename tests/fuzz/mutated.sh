@@ -16,7 +16,57 @@ seconds=${MHE_MUTATED_SECONDS:-30} # by default only what never ends fails: mach
 
 arm=$source/models/arm19
 cp "$arm/arm19.osim" model.osim
-cp "$source/tests/fuzz/corpus/biomod/arm.bioMod" model.bioMod
+cat > model.bioMod <<'END'
+version 4 // header
+gravity 0 -9.81 0
+variables
+ $l 0.25
+endvariables
+segment Trunk
+ RTinMatrix 1
+ RT 1 0 0 0  0 1 0 0.1  0 0 1 0  0 0 0 1
+endsegment
+segment Arm
+ parent Trunk
+ RT 0 0 0 xyz 0 -0.1 0
+ rotations zx
+ ranges -0.2 2.6 -1 1
+ mass 1.5
+ inertia 0.012 0 0 0 0.002 0 0 0 0.012
+ com 0 -0.13 0
+ meshfile a.vtp
+endsegment
+/* marker N endmarker */
+marker M
+ parent Arm
+ position 0.02 -$l 0.03
+ technical 1
+endmarker
+musclegroup G
+ OriginParent Trunk
+ InsertionParent Arm
+endmusclegroup
+muscle Flex
+ Type hilldegroote
+ musclegroup G
+ OriginPosition 0.05 0.2 0
+ InsertionPosition 0.02 -0.1 0
+ optimalLength 0.2
+ maximalForce 500
+ tendonSlackLength 0.1
+ pennationAngle 0.1
+ maxVelocity 10
+endmuscle
+viapoint v
+ parent Arm
+ muscle Flex
+ musclegroup G
+ position 0.03 -0.02 0.01
+endviapoint
+wrapping W
+ parent Arm
+endwrapping
+END
 sed '/^nRows/s/=.*/=30/' "$arm/demo_reference.sto" | awk '/^time/ { data = NR } !data || NR <= data + 30' > reference.sto
 "$(dirname "$run")/mhe-sim" noise "$arm/demo_recording.yaml" --set "reference=$PWD/reference.sto" --out made > made.txt 2>&1 &&
     cp made/recording.c3d data.c3d || fail "no recording: $(cat made.txt)"
@@ -34,15 +84,24 @@ END
 cat > angles.yaml <<'END'
 model: {file: model.bioMod, unsupported: warn}
 data: {angles: angles.sto}
+formulation: activation
 horizon: {window: 4, ratio: 2}
-costs: [{plugin: mhe.cost.track, signal: q, sigma: 0.01, weight: 30}, {plugin: mhe.cost.track, signal: excitation, value: [0]}]
+bounds: {residual_torques: true}
+costs: [{plugin: mhe.cost.track, signal: q, sigma: 0.01}, {plugin: mhe.cost.track, signal: activation, value: [0]},
+        {plugin: mhe.cost.track, signal: residual_torque, value: [0], sigma: 10}]
 output: {picture: false}
 END
-awk 'BEGIN { print "angles\nversion=1\nnRows=20\nnColumns=5\ninDegrees=no\nendheader\ntime\tArm_TransX\tArm_RotY\tArm_RotX\tArm_RotY2"
-    for (k = 0; k < 20; k++) print 0.01 * k, 0.01 * sin(k / 10), 0.3 + 0.01 * k, 0.1, 0.2 }' > angles.sto
+awk 'BEGIN { print "angles\nversion=1\nnRows=20\nnColumns=3\ninDegrees=no\nendheader\ntime\tArm_RotZ\tArm_RotX"
+    for (k = 0; k < 20; k++) print 0.01 * k "\t" 0.3 + 0.1 * sin(k / 8) "\t" 0.1 + 0.003 * k }' > angles.sto
 { grep -vE '^(data|horizon):' config.yaml 
     echo 'sources: [{plugin: mhe.source.recording, markers: data.trc, emg: data.sto, speed: 0}]'; } > live.yaml
 "$(dirname "$run")/mhe-live" live.yaml --record data.xdf > live.txt 2>&1 || cp "$source/tests/fuzz/corpus/xdf/two_streams.xdf" data.xdf
+# As they are they run, or what follows would say nothing.
+for set in config.yaml 'config.yaml --set data.markers=data.c3d' 'config.yaml --set data.markers=data.xdf' angles.yaml; do
+    # shellcheck disable=SC2086
+    "$run" $set --quiet --out out > out.txt 2> err.txt < /dev/null || fail "$set, unspoilt: $(cat err.txt)"
+    rm -rf out
+done
 n_kinds=7
 seed=$first
 done=0

@@ -72,6 +72,8 @@ sed 's/<scaling_order>measurements/<scaling_order>measurement/' setup.xml > orde
 refuses order "<scaling_order> takes measurements, manualScale or both, not 'measurement'" order.xml
 sed 's/large.trc/small.trc/' setup.xml > trial.xml
 refuses trial 'small.trc' trial.xml
+sed 's/<apply>true/<apply>false/' setup.xml > nothing.xml
+refuses nothing 'nothing.xml:2: nothing to do' nothing.xml
 sed 's/ScaleTool/InverseKinematicsTool/' setup.xml > tool.xml
 refuses tool 'no Scale setup: there is no <ScaleTool>' tool.xml
 head -5 setup.xml > cut.xml

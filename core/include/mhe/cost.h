@@ -106,7 +106,8 @@ typedef struct mhe_stage {
                           * the node before had */
     void *scratch;       /* [scratch_bytes], 64-byte aligned, this thread's own */
     const double *y_spread; /* [ny] standard deviation of an entry's targets since the start, of
-                             * EMG; NaN: not known. May be NULL */
+                             * EMG; of markers how far all were from the estimates (RMS of a
+                             * coordinate, m); NaN: not known. May be NULL */
 } mhe_stage;
 
 /* Is an entry the one of that name, or one of its axes ("STER.x" of "STER")? [any] */

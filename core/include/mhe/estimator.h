@@ -42,7 +42,9 @@
  * it, so that programs built with an older header go on. Arrays of structs have a stride. A NULL
  * where a pointer is needed, or a size too small to hold anything, is MHE_E_ARGUMENT.
  *
- * Threads: one estimator belongs to one thread at a time; several estimators are independent. */
+ * Threads: one estimator belongs to one thread at a time; several estimators are independent. After
+ * fork() the child has none of the solver's threads: its copy goes on with the child's own thread
+ * and can be closed there, where no call was in work when the parent forked. */
 #ifndef MHE_ESTIMATOR_H
 #define MHE_ESTIMATOR_H
 
@@ -218,7 +220,7 @@ typedef struct mhe_estimate {
                                   * solver's fast method gave up and the safe one solved */
     /* Standard deviations, where output.uncertainty asks for them, else NULL: what the config's
      * section `uncertainty` says of measurements and model, carried through the estimator to first
-     * order. */
+     * order. NaN where they could not be found. */
     const double *q_sd;          /* [n_q], rad (m) */
     const double *activation_sd; /* [n_muscles] */
     const double *force_sd;      /* [n_muscles], N */

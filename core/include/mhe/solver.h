@@ -126,10 +126,11 @@ typedef struct mhe_solve_control {
     int32_t (*progress)(void *data, int32_t iteration, double objective, double kkt_residual);
     void *budget; /* for spent */
     /* Not 0: the work that this solve may do is done; the solver then stops as at a deadline. To be
-     * asked wherever the deadline is looked at, with the interior-point steps (factorisations of
-     * all stages) done since it was last asked; evaluate() counts for itself. Not while evaluate()
-     * runs. May be NULL. */
-    int32_t (*spent)(void *budget, int32_t steps);
+     * asked wherever the deadline is looked at, with the linear systems over all stages that were
+     * solved since it was last asked: each solution counts 1, factors of such a system what they
+     * take beside it (4 to 6). evaluate() counts for itself. Not while evaluate() runs. May be
+     * NULL. */
+    int32_t (*spent)(void *budget, int32_t solutions);
     /* Not 0: the deadline is nearer than `seconds`. Where it is given, it is asked instead of the
      * clock (a replay answers what was answered once, whatever the clock says), on the thread that
      * called solve() and not while evaluate() runs. May be NULL. */

@@ -206,7 +206,7 @@ static const mhe_option realtime_options[] = {
     MHE_OPT_REAL(mhi_realtime_section, deadline_ms, 0, 0, 1e6, "ms",
                  "Time from a frame to its estimate, after which a solve ends with what it has; 0: "
                  "not the time, but the work is limited, to ten times what frames usually take; "
-                 "with mhe-run --realtime the time between frames."),
+                 "with mhe-run --realtime three quarters of the time between frames."),
     MHE_OPT_INT(mhi_realtime_section, threads, 1, 1, 256, "1",
                 "Threads that evaluate a window's intervals, where the solver can use them."),
 };

@@ -281,11 +281,29 @@ static void settle(mhi_bands *b) {
     b->begun = 1;
 }
 
+/* NaN, until something is known. */
+static void give_unknown(mhi_bands *b, mhe_estimate *out) {
+    double *const all[] = {b->q, b->moment, b->activation, b->force_sd};
+    for (int32_t k = 0; k < 4; k++) {
+        for (int32_t i = 0; i < (k < 2 ? b->n_q : b->n_m); i++) {
+            all[k][i] = NAN;
+        }
+    }
+    out->q_sd = b->q;
+    out->activation_sd = b->activation;
+    out->force_sd = b->force_sd;
+    out->moment_sd = b->moment;
+}
+
 void mhi_bands_give(mhe_estimator *e, int32_t k, mhe_estimate *out) {
     mhi_bands *b = e->bands;
     mhi_muscle_state muscles;
     mhe_system_point at;
-    if (b == NULL || (b->gain.node > 0 && !b->gain.whole)) {
+    if (b == NULL) {
+        return;
+    }
+    give_unknown(b, out);
+    if (b->gain.node > 0 && !b->gain.whole) {
         return;
     }
     renew(e, b);
@@ -312,8 +330,4 @@ void mhi_bands_give(mhe_estimator *e, int32_t k, mhe_estimate *out) {
     }
     mhi_bands_learn(e, b);
     move_on(b);
-    out->q_sd = b->q;
-    out->activation_sd = b->activation;
-    out->force_sd = b->force_sd;
-    out->moment_sd = b->moment;
 }

@@ -135,6 +135,15 @@ static double variation_of(const double *spread, int32_t m) {
     return spread == NULL || !(spread[m] > 0) ? UNKNOWN : spread[m];
 }
 
+/* A share by which a number may be off is one of the true number; what is at hand is already off,
+ * and where it is too small the truth is more than that share above it. Of e normal with deviation
+ * sd, e / (1 + e) has 95 % of its values below what one sided quantiles of e make of it. */
+static double share_of_known(double sd) {
+    const double one_sided = 1.645, two_sided = 1.96;
+    const double low = fmin(one_sided * sd, 0.8);
+    return fmax(sd, one_sided / two_sided * sd / (1 - low));
+}
+
 static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
     const mhi_uncertainty_section *c = b->config;
     const double *emg = emg_of(e, k < e->window.n ? k : e->window.n - 1);
@@ -142,7 +151,7 @@ static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
     for (int32_t m = 0; m < b->n_m; m++) {
         const int32_t known = emg != NULL && !isnan(emg[m]);
         const double noise = b->emg.level * c->emg_noise * variation_of(spread, m);
-        const double gain = known ? c->emg_gain * emg[m] : 0;
+        const double gain = known ? share_of_known(c->emg_gain) * emg[m] : 0;
         const double all = known ? noise * noise + gain * gain + c->emg_floor * c->emg_floor
                                  : c->control * c->control;
         b->size[m] = sqrt(all);
@@ -155,7 +164,7 @@ static void size_forces(mhe_estimator *e, mhi_bands *b, const double *activation
                         const mhi_muscle_state *muscles) {
     double *size = b->size + b->n_m;
     for (int32_t m = 0; m < b->n_m; m++) {
-        const double strength = b->config->max_isometric_force * muscles->force[m];
+        const double strength = share_of_known(b->config->max_isometric_force) * muscles->force[m];
         size[m] = strength * strength;
     }
     for (int32_t i = 0; i < MHI_N_VARIANTS; i += 2) {

@@ -222,7 +222,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     e->window.solution.has_multipliers = 0;
     e->window.has_left = 0;
     mhi_phase_on(e, MHI_EVENT_BEGUN);
-    e->begin.rounds = 0;
+    e->begin.rounds = e->begin.stuck = 0;
     mhi_bands_forget(e->bands);
     mhi_window_set_bounds(e);
     if (e->window.solved == 0) {

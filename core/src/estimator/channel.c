@@ -294,6 +294,14 @@ void mhi_channel_spread(mhi_channel *c, int32_t filled, double *spread) {
     }
 }
 
+void mhi_channel_compare(mhi_channel *c, const double *estimated, const double *believed) {
+    for (int32_t i = 0; i < c->face.width; i++) {
+        const double d = estimated[i] - believed[i];
+        c->misfit += isnan(d) ? 0 : d * d;
+        c->n_misfit += !isnan(d);
+    }
+}
+
 void mhi_channels_shift(mhi_channels *channels, int32_t filled) {
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_channel *c = &channels->rows[i];

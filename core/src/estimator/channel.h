@@ -31,11 +31,12 @@ typedef struct mhi_channel {
     double span;       /* s that a node's mean is over; 0: not known, or no mean */
 
     /* Rows of the window's nodes, oldest first. */
-    double *measured; /* [nodes x width] */
-    double *believed; /* the same, NaN where trust.c does not believe it: the targets */
-    int32_t *why;     /* [nodes x width] MHE_TRACK_* */
-    double *sums;     /* [6 x width] over nodes that have left the window; and with those in it */
-    uint8_t *late;    /* [nodes x width] 0: it came with the frame, which nothing later changes */
+    double *measured;        /* [nodes x width] */
+    double *believed;        /* the same, NaN where trust.c does not believe it: the targets */
+    int32_t *why;            /* [nodes x width] MHE_TRACK_* */
+    double misfit, n_misfit; /* sum of squares of how far estimates were from it; of how many */
+    double *sums;  /* [6 x width] over nodes that have left the window; and with those in it */
+    uint8_t *late; /* [nodes x width] 0: it came with the frame, which nothing later changes */
 
     int32_t *n_in_mean;     /* [width] frames in the newest node's mean */
     double *line;           /* [(frames+1) x width] of the last frames */
@@ -77,6 +78,8 @@ void mhi_channel_believe(mhi_channel *channel, int32_t nodes);
 /* Standard deviation [width] of all that was measured so far, with the `filled` nodes of the
  * window; NaN: nothing was. */
 void mhi_channel_spread(mhi_channel *channel, int32_t filled, double *spread);
+/* Counts how far an estimate [width] is from what was believed; missing entries do not count. */
+void mhi_channel_compare(mhi_channel *channel, const double *estimated, const double *believed);
 /* The oldest of the nodes is dropped; the newest stands twice. */
 void mhi_channels_shift(mhi_channels *channels, int32_t filled);
 int32_t mhi_channel_any(const double *values, int32_t n); /* one of them is not NaN */

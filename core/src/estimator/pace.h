@@ -42,7 +42,7 @@ void mhi_pace_predict(mhe_estimator *e);
 void mhi_pace_postures(mhe_estimator *e, int32_t begun);
 /* 1: its time or work is over. The others: mhe_solve_control.spent and late. */
 int32_t mhi_pace_over(mhe_estimator *e);
-int32_t mhi_pace_spent(void *estimator, int32_t steps);
+int32_t mhi_pace_spent(void *estimator, int32_t solutions);
 int32_t mhi_pace_late(void *estimator, double seconds);
 int32_t mhi_pace_by_clock(const mhe_estimator *e); /* the frame in work has a deadline */
 /* Before an evaluation that no look precedes. */

@@ -84,7 +84,8 @@ static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err)
         mhi_window_follow(e);
         look_for_late(e);
         mhi_trust_screen(e);
-        if (mhi_trust_is_lost(e)) {
+        /* Where not even a step was made from the old guess, today's measurements are nearer. */
+        if (mhi_trust_is_lost(e) || (e->begin.stuck && e->begin.restarted)) {
             (void)mhi_window_begin(e, NULL); /* where it cannot, the old start goes on */
         }
     } else {
@@ -165,6 +166,16 @@ static void take_frame(mhe_estimator *e, const mhe_frame *frame, int32_t used) {
     take_rates(e, e->window.filled - 1);
 }
 
+/* How far the markers stay from the model: what costs may take for their noise. */
+static void learn_misfit(mhe_estimator *e, int32_t status) {
+    for (int32_t i = 0; i < e->channels.n && status == MHE_FRAME_OK; i++) {
+        mhi_channel *c = &e->channels.rows[i];
+        if (c->signal == MHI_SIGNAL_MARKERS && c->read) {
+            mhi_channel_compare(c, e->output.rows[i].estimated, e->output.rows[i].target);
+        }
+    }
+}
+
 /* The full window's estimate. `*ready` 0: it cannot be solved yet. */
 static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t *ready,
                                mhe_error *err) {
@@ -182,6 +193,7 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
         status = mhi_output_give(e, e->node, estimate, err);
         if (status == MHE_OK) {
             mhi_bands_give(e, e->node, estimate);
+            learn_misfit(e, estimate->status);
         }
         estimate->latency = mhi_seconds() - e->pace.arrival;
         estimate->solve_time = estimate->latency + e->pace.ahead;

@@ -187,6 +187,8 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
     if (status != MHE_OK) {
         tell_failure(e, why.text);
     }
+    e->begin.stuck =
+        !mhi_phase_settled(e) && info->outcome == MHE_SOLVE_DEADLINE && info->iterations == 0;
     const int finite =
         mhi_all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->window.n_x) &&
         mhi_all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);

@@ -96,6 +96,11 @@ void mhi_window_set_targets(mhe_estimator *e) {
         mhi_channel *c = &e->channels.rows[i];
         if (c->read && c->signal >= 0 && !c->posture) {
             mhi_channel_spread(c, e->window.filled, mhi_ocp_target_spread(e->ocp, c->signal));
+        } else if (c->read && c->signal == MHI_SIGNAL_MARKERS && c->n_misfit > 0) {
+            double *spread = mhi_ocp_target_spread(e->ocp, c->signal);
+            for (int32_t j = 0; j < c->face.width; j++) {
+                spread[j] = sqrt(c->misfit / c->n_misfit);
+            }
         }
     }
     for (int32_t k = 0; k <= e->window.n; k++) {

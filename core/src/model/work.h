@@ -13,8 +13,8 @@
 #include <stdint.h>
 
 #define MHI_WORK_ACCELERATION 2
-#define MHI_WORK_DERIVATIVES 6 /* an acceleration with its derivatives */
-#define MHI_WORK_LOAN 32
+#define MHI_WORK_DERIVATIVES 12 /* one with its derivatives and what integrators make of them */
+#define MHI_WORK_LOAN 64
 
 typedef struct mhi_work {
     atomic_llong left;

@@ -249,6 +249,11 @@ mhe_status mhi_scale_setup_read(mhi_scale_setup *s, const char *path, mhe_error 
     if (status == MHE_OK) {
         status = read_placer(s, mhi_xml_child(tool, "MarkerPlacer"), err);
     }
+    if (status == MHE_OK && !s->scales && !s->places) {
+        status = mhi_document_fail(&s->file, mhi_xml_line(tool), err,
+                                   "nothing to do: neither <ModelScaler> nor <MarkerPlacer> "
+                                   "applies");
+    }
     return status == MHE_OK && s->file.o.b.status != MHE_OK ? s->file.o.b.status
            : status == MHE_OK && s->arena.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                                                  : status;

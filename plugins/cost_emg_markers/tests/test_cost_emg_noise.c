@@ -45,6 +45,23 @@ static void the_largest_share_counts(void **state) {
     cost_rig_close(&rig);
 }
 
+/* Markers: the least, or a share of how far they were off so far. */
+static void markers_follow_their_misfit(void **state) {
+    (void)state;
+    cost_rig rig;
+    double misfit[COST_RIG_ROWS] = {0};
+    open_rig(&rig, "{markers: 0.002, markers_misfit: 0.5}", MHE_FORMULATION_EXCITATION, 0);
+    const int at = cost_rig_at(&rig, "markers", 0);
+    const double known[] = {0.001, 0.02, NAN}, sigma[] = {0.002, 0.01, 0.002};
+    memcpy(misfit + at, known, sizeof known);
+    rig.stage.y_spread = misfit;
+    cost_rig_evaluate(&rig);
+    for (int i = 0; i < 3; i++) {
+        assert_true(fabs(rig.J[at + i] * sigma[i] - 1) < 1e-12);
+    }
+    cost_rig_close(&rig);
+}
+
 static void what_is_not_measured_is_held_loosely(void **state) {
     (void)state;
     cost_rig rig;
@@ -91,6 +108,7 @@ static void a_muscle_that_is_none_is_refused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_largest_share_counts),
+        cmocka_unit_test(markers_follow_their_misfit),
         cmocka_unit_test(what_is_not_measured_is_held_loosely),
         cmocka_unit_test(activations_are_controls),
         cmocka_unit_test(a_muscle_that_is_none_is_refused),

@@ -5,7 +5,9 @@
 
 #include <stdatomic.h>
 #include <string.h>
+#include <sys/wait.h>
 #include <time.h>
+#include <unistd.h>
 
 #define N_ITEMS 23
 #define N_WORKERS 5
@@ -94,6 +96,27 @@ static void refusal_ends_the_loop(void **state) {
     }
 }
 
+/* A child has the pool's memory, but none of its threads (it crashed when it waited for them). */
+static void a_child_works_alone(void **state) {
+    (void)state;
+    rti_pool *pool = rti_pool_create(N_WORKERS, 50e-6);
+    count c = {.refused = -1};
+    const pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        rti_pool_run(pool, N_ITEMS, add_one, &c);
+        rti_pool_destroy(pool);
+        _exit(c.by_worker[0] == N_ITEMS ? 0 : 1);
+    }
+    int status = -1;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_true(WIFEXITED(status));
+    assert_int_equal(WEXITSTATUS(status), 0);
+    rti_pool_run(pool, N_ITEMS, add_one, &c);
+    assert_all_done(&c, 1);
+    rti_pool_destroy(pool);
+}
+
 static void ends_unused(void **state) {
     (void)state;
     for (int i = 0; i < 20; i++) {
@@ -105,6 +128,7 @@ static void ends_unused(void **state) {
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_item_once), cmocka_unit_test(long_items_are_shared),
-        cmocka_unit_test(refusal_ends_the_loop), cmocka_unit_test(ends_unused)};
+        cmocka_unit_test(refusal_ends_the_loop), cmocka_unit_test(a_child_works_alone),
+        cmocka_unit_test(ends_unused)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

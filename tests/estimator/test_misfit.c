@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* mhe.cost.emg-markers takes the markers' noise from how far they stay from the model. */
+#include "estimator/recording.h"
+#include "fixture.h"
+#include "support.h"
+
+#include <math.h>
+#include <string.h>
+
+#define N_M 19
+#define N_K 8
+#define RATIO 3
+#define WINDOW 4
+#define SKIP 10
+#define MODELS MHE_TEST_SOURCE_DIR "/models/arm19/"
+
+typedef struct outcome {
+    double force, angle;    /* root of the mean squared error */
+    double last_force[N_M]; /* of the last estimate */
+} outcome;
+
+/* With every marker's place `off` (m), a direction each, and the truth's EMG. */
+static outcome run(const char *cost, double off) {
+    test_fixture f;
+    mhi_recording *r = NULL;
+    char yaml[2048];
+    outcome out = {0};
+    int32_t n = 0;
+    uint64_t seed = 16;
+    double offset[3 * N_K];
+    (void)snprintf(yaml, sizeof yaml,
+                   "model: {file: $ARM19}\nmuscle: {curves: paper2021, passive_ramp: 0.02}\n"
+                   "data: {markers: " MODELS "demo_markers.trc, emg: " MODELS "demo_emg.sto, "
+                   "reference: " MODELS "demo_reference.sto}\n"
+                   "horizon: {window: 4, ratio: 3}\ncosts: [%s]\n",
+                   cost);
+    if (test_fixture_open(&f, yaml) != MHE_OK ||
+        mhi_recording_read(f.run, mhi_system_description(f.system), &f.host, &r, &f.err) !=
+            MHE_OK) {
+        fail_msg("%s", f.err.text);
+    }
+    for (int32_t i = 0; i < 3 * N_K; i++) {
+        offset[i] = off * test_random(&seed, -1, 1);
+    }
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        mhe_frame frame = mhi_recording_frame(r, N_K, N_M, k);
+        double markers[3 * N_K];
+        for (int32_t i = 0; i < 3 * N_K; i++) {
+            markers[i] = frame.markers[i] + offset[i];
+        }
+        frame.markers = markers;
+        mhe_estimate e = {.size = sizeof e};
+        int32_t ready = 0;
+        assert_int_equal(mhe_estimator_push(f.estimator, &frame, &e, &ready, &f.err), MHE_OK);
+        if (!ready || ++n <= SKIP) {
+            continue;
+        }
+        const int32_t at = k - WINDOW * RATIO;
+        for (int32_t m = 0; m < N_M; m++) {
+            const double d = e.force[m] - r->reference.force[at * N_M + m];
+            out.force += d * d;
+        }
+        for (int32_t j = 0; j < 4; j++) {
+            const double d = e.q[j] - r->reference.q[at * 4 + j];
+            out.angle += d * d;
+        }
+        memcpy(out.last_force, e.force, sizeof out.last_force);
+    }
+    out.force = sqrt(out.force / ((n - SKIP) * N_M));
+    out.angle = sqrt(out.angle / ((n - SKIP) * 4));
+    mhi_recording_free(r);
+    test_fixture_close(&f);
+    return out;
+}
+
+/* Markers a centimetre off that are believed to a millimetre bend the forces; those of a model that
+ * they fit change nothing. */
+static void markers_that_do_not_fit_are_believed_less(void **state) {
+    (void)state;
+    const outcome firm = run("{plugin: mhe.cost.emg-markers, markers_misfit: 0}", 0.015);
+    const outcome learnt = run("mhe.cost.emg-markers", 0.015);
+    print_message("force %.2f N and %.2f N, angles %.4f and %.4f rad\n", firm.force, learnt.force,
+                  firm.angle, learnt.angle);
+    assert_true(learnt.force < 0.9 * firm.force);
+    assert_true(learnt.angle < firm.angle);
+    const outcome fits = run("mhe.cost.emg-markers", 0);
+    const outcome fits_firm = run("{plugin: mhe.cost.emg-markers, markers_misfit: 0}", 0);
+    assert_memory_equal(fits.last_force, fits_firm.last_force, sizeof fits.last_force);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(markers_that_do_not_fit_are_believed_less),
+    };
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
