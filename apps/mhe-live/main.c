@@ -5,11 +5,16 @@
 
 #include <mhe/library.h>
 #include <mhe/live.h>
+#include <poll.h>
+#include <pthread.h>
 #include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
 
 static mhe_live *running; /* for the signal handler; set before it is installed */
 
@@ -73,7 +78,10 @@ static const words_program program = {
     .notes =
         "The config is that of mhe-run with two more sections: 'sources', where data come from, "
         "and\n'sinks', where estimates go. Ctrl-C ends the run; its summary is printed as "
-        "JSON.\nExit status: 0 done; 1 the run failed; 2 the command line, the configuration or "
+        "JSON.\nLines on the standard input: record-start, record-stop, mvc-start ELECTRODE, "
+        "mvc-stop, "
+        "label CAME=MODEL,\nstate, stop.\nExit status: 0 done; 1 the run failed; 2 the command "
+        "line, the configuration or "
         "a file is wrong.\n",
     .commands = commands,
     .n_commands = 1,
@@ -108,6 +116,70 @@ static mhe_status print_summary(mhe_live *live, mhe_error *err) {
     return status;
 }
 
+/* ---- lines of the standard input ---- */
+
+static atomic_int listening;
+
+/* In the background a terminal's input belongs to somebody else; to read it would stop the program.
+ */
+static int is_ours(void) {
+    return !isatty(STDIN_FILENO) || tcgetpgrp(STDIN_FILENO) == getpgrp();
+}
+
+static void obey(const char *line) {
+    mhe_error err = {0};
+    char *json = NULL;
+    if (strcmp(line, "state") == 0) {
+        if (mhe_live_state(running, &json, &err) == MHE_OK) {
+            (void)printf("%s\n", json);
+            (void)fflush(stdout);
+        }
+        mhe_free(json);
+    } else if (line[0] != '\0' && mhe_live_command(running, line, &err) != MHE_OK) {
+        (void)fprintf(stderr, "mhe-live: %s\n", err.text);
+    }
+}
+
+static void *listen_to_lines(void *data) {
+    char text[1024];
+    size_t n = 0;
+    (void)data;
+    while (atomic_load(&listening)) {
+        struct pollfd input = {.fd = STDIN_FILENO, .events = POLLIN};
+        if (!is_ours() || poll(&input, 1, 100) <= 0) {
+            const struct timespec pause = {0, 50000000};
+            (void)nanosleep(&pause, NULL);
+            continue;
+        }
+        const ssize_t got = read(STDIN_FILENO, text + n, sizeof text - 1 - n);
+        if (got <= 0) {
+            return NULL; /* nobody will say anything any more */
+        }
+        n += (size_t)got;
+        text[n] = '\0';
+        for (char *end = strchr(text, '\n'); end != NULL; end = strchr(text, '\n')) {
+            *end = '\0';
+            obey(text);
+            n -= (size_t)(end + 1 - text);
+            memmove(text, end + 1, n + 1);
+        }
+        n = n == sizeof text - 1 ? 0 : n; /* no line is that long */
+    }
+    return NULL;
+}
+
+static mhe_status run_listening(const arguments *w, mhe_error *err) {
+    pthread_t thread;
+    atomic_store(&listening, 1);
+    const int started = pthread_create(&thread, NULL, listen_to_lines, NULL) == 0;
+    const mhe_status status = mhe_live_run(running, w->seconds, err);
+    atomic_store(&listening, 0);
+    if (started) {
+        (void)pthread_join(thread, NULL);
+    }
+    return status;
+}
+
 static mhe_status run(const arguments *w, mhe_error *err) {
     const mhe_host host = {.size = sizeof host, .log = on_log, .service = no_service};
     mhe_config *config = NULL;
@@ -128,7 +200,7 @@ static mhe_status run(const arguments *w, mhe_error *err) {
         const struct sigaction action = {.sa_handler = on_signal, .sa_flags = (int)SA_RESETHAND};
         (void)sigaction(SIGINT, &action, NULL);
         (void)sigaction(SIGTERM, &action, NULL);
-        status = mhe_live_run(running, w->seconds, err);
+        status = run_listening(w, err);
         if (status == MHE_OK && !w->quiet) {
             status = print_summary(running, err);
         }

@@ -57,8 +57,7 @@ static int same_token(const char *a, const char *b) {
 }
 
 void web_command(web *w, web_client *c, const char *json) {
-    static const char *const names[] = {"stop", "record-start", "record-stop", "mvc-start",
-                                        "mvc-stop"};
+    static const char *const names[] = MHE_CONTROL_NAMES;
     char name[32] = "", token[64] = "", text[256] = "";
     mhe_error err = {0};
     (void)web_json_find(json, "token", token, sizeof token);
@@ -81,7 +80,8 @@ void web_command(web *w, web_client *c, const char *json) {
             return;
         }
     }
-    answer(c, "error", "'do' is none of stop, record-start, record-stop, mvc-start, mvc-stop");
+    answer(c, "error",
+           "'do' is none of stop, record-start, record-stop, mvc-start, mvc-stop, label");
 }
 
 static int send_text(web *w, web_client *c, const char *text, size_t n) {

@@ -9,7 +9,7 @@
 #include <sys/random.h>
 #include <time.h>
 
-#define STATE_ROOM 16384 /* bytes of the run's state */
+#define STATE_ROOM 65536 /* bytes of the run's state */
 
 double web_now(void) {
     struct timespec t;
@@ -23,30 +23,6 @@ int web_write(web *w, web_client *c, size_t n, int text) {
     const int sent =
         lws_write(c->wsi, w->out + LWS_PRE, n, text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY);
     return sent < (int)n ? -1 : 0;
-}
-
-void web_answer(web_client *c, char *text) {
-    free(c->answer);
-    c->answer = text;
-}
-
-int web_send_answer(web *w, web_client *c) {
-    if (c->answer == NULL) {
-        return 0;
-    }
-    const size_t n = strlen(c->answer);
-    if (n > w->out_room) { /* an advertisement of many channels */
-        uint8_t *grown = realloc(w->out, LWS_PRE + n);
-        if (grown == NULL) {
-            return -1;
-        }
-        w->out = grown;
-        w->out_room = n;
-    }
-    memcpy(w->out + LWS_PRE, c->answer, n);
-    free(c->answer);
-    c->answer = NULL;
-    return web_write(w, c, n, 1) < 0 ? -1 : 1;
 }
 
 static web *web_of(struct lws *wsi) {

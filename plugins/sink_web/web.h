@@ -98,6 +98,8 @@ int web_send_foxglove(web *w, web_client *c);
 
 /* server.c: sends `n` bytes at w->out + LWS_PRE. */
 int web_write(web *w, web_client *c, size_t n, int text);
+
+/* answer.c */
 int web_send_answer(web *w, web_client *c); /* c->answer, if any; 1: sent */
 void web_answer(web_client *c, char *text); /* takes the text over */
 

@@ -9,11 +9,19 @@
  * factorisation and its solutions. */
 #define SOLUTIONS 40
 
+/* A replay knows of each evaluation whether the clock broke it off: it is asked before. */
+static int32_t evaluate(ipopt_solver *s, const compat_number *v, int32_t level) {
+    if (s->control != NULL && s->control->late != NULL) {
+        (void)s->control->late(s->control->budget, 0);
+    }
+    return nlp_evaluate(&s->nlp, v, level);
+}
+
 static compat_bool eval_f(compat_index n, compat_number *v, compat_bool new_x, compat_number *f,
                           void *data) {
     ipopt_solver *s = data;
     (void)n, (void)new_x;
-    if (!nlp_evaluate(&s->nlp, v, NLP_VALUES)) {
+    if (!evaluate(s, v, NLP_VALUES)) {
         return 0;
     }
     *f = nlp_cost(&s->nlp);
@@ -24,7 +32,7 @@ static compat_bool eval_g(compat_index n, compat_number *v, compat_bool new_x, c
                           compat_number *g, void *data) {
     ipopt_solver *s = data;
     (void)n, (void)new_x, (void)m;
-    if (!nlp_evaluate(&s->nlp, v, NLP_VALUES)) {
+    if (!evaluate(s, v, NLP_VALUES)) {
         return 0;
     }
     nlp_constraints(&s->nlp, g);
@@ -35,7 +43,7 @@ static compat_bool eval_grad_f(compat_index n, compat_number *v, compat_bool new
                                compat_number *grad, void *data) {
     ipopt_solver *s = data;
     (void)new_x;
-    if (!nlp_evaluate(&s->nlp, v, NLP_ALL)) {
+    if (!evaluate(s, v, NLP_ALL)) {
         return 0;
     }
     nlp_cost_gradient(&s->nlp, s->work);
@@ -62,7 +70,7 @@ static compat_bool eval_jac_g(compat_index n, compat_number *v, compat_bool new_
         structure(s->nlp.jacobian, n_entries, row, col);
         return 1;
     }
-    if (!nlp_evaluate(&s->nlp, v, NLP_ALL)) {
+    if (!evaluate(s, v, NLP_ALL)) {
         return 0;
     }
     for (compat_index i = 0; i < n_entries; i++) {
@@ -81,7 +89,7 @@ static compat_bool eval_h(compat_index n, compat_number *v, compat_bool new_x,
         structure(s->nlp.hessian, n_entries, row, col);
         return 1;
     }
-    if (!nlp_evaluate(&s->nlp, v, NLP_ALL)) {
+    if (!evaluate(s, v, NLP_ALL)) {
         return 0;
     }
     if (s->config->adapt_curvature) {
@@ -101,7 +109,8 @@ static int32_t is_late(ipopt_solver *s) {
         s->begun = now;
     }
     const double one = s->iterations > 0 ? (now - s->begun) / s->iterations : 0;
-    return now + one >= s->control->deadline;
+    return s->control->late != NULL ? s->control->late(s->control->budget, one)
+                                    : s->control->deadline > 0 && now + one >= s->control->deadline;
 }
 
 static compat_bool intermediate(compat_index mode, compat_index iteration, compat_number objective,
@@ -120,7 +129,7 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
         control->progress(control->data, iteration, objective, s->kkt_residual)) {
         s->stopped = MHE_SOLVE_INTERRUPTED;
     } else if (control != NULL &&
-               ((control->deadline > 0 && is_late(s)) ||
+               (is_late(s) ||
                 (control->spent != NULL && control->spent(control->budget, SOLUTIONS)))) {
         s->stopped = MHE_SOLVE_DEADLINE;
     }

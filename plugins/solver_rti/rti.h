@@ -148,6 +148,7 @@ mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err)
 /* step.c: the work that this solve may do is done; `steps` interior-point steps since this was last
  * asked. */
 int32_t rti_is_spent(rti_solver *s);
+int32_t rti_is_late(const rti_solver *s, double seconds); /* the deadline is nearer than that */
 
 /* sqp.c */
 mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err);

@@ -144,8 +144,7 @@ static int32_t verdict(rti_solver *s, const mhe_solve_control *control, int32_t 
         return MHE_SOLVE_ITERATION_LIMIT;
     }
     /* The next iteration will take about as long as the last one. */
-    if ((isfinite(s->deadline) && rti_now() + s->iteration_time >= s->deadline) ||
-        rti_is_spent(s)) {
+    if (rti_is_late(s, s->iteration_time) || rti_is_spent(s)) {
         return MHE_SOLVE_DEADLINE;
     }
     return -1;
@@ -272,6 +271,8 @@ mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err) {
     s->err = err;
     s->prepared = 0;
     s->failure = MHE_OK;
+    s->control = NULL; /* ahead of a solve there is no limit of one */
+    s->deadline = INFINITY;
     if (is_finite(s->here.w, size_z(&s->shape))) {
         s->prepared = rti_evaluate(s, &s->here, RTI_DYNAMICS | RTI_DERIVATIVES);
     }
@@ -305,7 +306,8 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
     s->leap = (rti_leap){0};
     s->control = control;
     s->deadline = control != NULL && control->deadline > 0 ? control->deadline : INFINITY;
-    if (isfinite(s->deadline) && rti_now() >= s->deadline) { /* at once */
+    if (rti_is_late(s, 0)) { /* at once */
+        s->control = NULL;
         info->outcome = MHE_SOLVE_DEADLINE;
         info->primal_residual = s->prepared ? largest_gap(s) : INFINITY;
         return MHE_OK;

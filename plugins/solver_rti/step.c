@@ -22,10 +22,17 @@ int32_t rti_is_spent(rti_solver *s) {
     return control != NULL && control->spent != NULL && control->spent(control->budget, solutions);
 }
 
+int32_t rti_is_late(const rti_solver *s, double seconds) {
+    const mhe_solve_control *control = s->control;
+    return control != NULL && control->late != NULL
+               ? control->late(control->budget, seconds)
+               : isfinite(s->deadline) && rti_now() + seconds >= s->deadline;
+}
+
 /* Before each iteration of a program, too. */
 static int32_t is_late(const void *data) {
     rti_solver *s = (rti_solver *)data; /* whose count of solutions is told */
-    return rti_is_spent(s) || (isfinite(s->deadline) && rti_now() >= s->deadline);
+    return rti_is_spent(s) || rti_is_late(s, 0);
 }
 
 /* How far from its limits the program of a whole recording may stay while the iterate is far from

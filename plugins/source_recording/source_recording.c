@@ -17,23 +17,26 @@
 struct recording_config { /* filled by the core from the option table */
     const char *file, *markers, *emg, *angles;
     double speed;
-    int32_t loop;
+    int32_t loop, granted;
 };
 
 /* A stream of one of the files. */
 typedef struct track {
     const mhe_recorded_stream *stream;
     int64_t next;
+    int32_t slot; /* stream as the core knows it */
 } track;
 
 typedef struct recording {
     struct recording_config config;
     const mhe_recorded_service *service;
     const mhe_recorded *files[MOST_FILES];
-    int32_t n_files, n_tracks;
+    int32_t n_files, n_tracks, n_slots;
     track *tracks;
+    int32_t
+        *of_slot; /* [n_slots] track that a stream is now: one that is described again is another */
     const mhe_recorded *arrivals; /* file whose packets are repeated; NULL: none */
-    int64_t next_arrival;
+    int64_t next_arrival, next_grant;
     double offset; /* of the packet in work: stamps + offset is CLOCK_MONOTONIC; NaN: not known */
     double first;  /* s, earliest stamp */
     double begun;  /* s of CLOCK_MONOTONIC at which `first` is due */
@@ -62,6 +65,7 @@ static void recording_destroy(void *self) {
         s->service->free(s->files[i]);
     }
     free(s->tracks);
+    free(s->of_slot);
     free(s);
 }
 
@@ -80,14 +84,23 @@ static mhe_status lay_tracks(recording *s, mhe_error *err) {
         n += s->files[i]->n_streams;
     }
     s->tracks = calloc((size_t)n + 1, sizeof *s->tracks);
-    if (s->tracks == NULL) {
+    s->of_slot = calloc((size_t)n + 1, sizeof *s->of_slot);
+    if (s->tracks == NULL || s->of_slot == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     s->first = INFINITY;
     for (int32_t i = 0; i < s->n_files; i++) {
         for (int32_t k = 0; k < s->files[i]->n_streams; k++) {
             const mhe_recorded_stream *stream = stream_at(s->files[i], k);
-            s->tracks[s->n_tracks++].stream = stream;
+            track *t = &s->tracks[s->n_tracks];
+            t->stream = stream;
+            if (s->n_files == 1 && stream->replaces >= 0 && stream->replaces < k) {
+                t->slot = s->tracks[stream->replaces].slot;
+            } else {
+                t->slot = s->n_slots;
+                s->of_slot[s->n_slots++] = s->n_tracks;
+            }
+            s->n_tracks++;
             s->first = stream->n > 0 ? fmin(s->first, stream->stamp[0]) : s->first;
         }
         if (s->n_files == 1 && s->files[i]->n_arrivals > 0) {
@@ -136,17 +149,17 @@ static mhe_status recording_open(void *self, double deadline, mhe_error *err) {
 }
 
 static int32_t recording_count(const void *self) {
-    return ((const recording *)self)->n_tracks;
+    return ((const recording *)self)->n_slots;
 }
 
 static mhe_status recording_stream(const void *self, int32_t i, mhe_stream_info *out,
                                    mhe_error *err) {
     const recording *s = self;
-    if (i < 0 || i >= s->n_tracks) {
+    if (i < 0 || i >= s->n_slots) {
         return mhe_fail(err, MHE_E_ARGUMENT, "stream %d is not there", (int)i);
     }
     const uint32_t size = out->size;
-    *out = s->tracks[i].stream->about;
+    *out = s->tracks[s->of_slot[i]].stream->about;
     out->size = size;
     return MHE_OK;
 }
@@ -163,6 +176,37 @@ static void end(recording *s, const mhe_source_taker *taker) {
 }
 
 /* ---- packets as they came ---- */
+
+static const mhe_grant *grant_at(const mhe_recorded *r, int64_t i) {
+    return (const mhe_grant *)(const void *)((const char *)r->grants + (size_t)i * r->grant_size);
+}
+
+/* Streams that were described again before this packet. */
+static void describe_again(recording *s, const mhe_source_taker *taker) {
+    for (int32_t i = 0; i < s->n_tracks; i++) {
+        const track *t = &s->tracks[i];
+        if (t->stream->replaces >= 0 && t->stream->from == s->next_arrival &&
+            s->of_slot[t->slot] < i) {
+            s->of_slot[t->slot] = i;
+            taker->event(taker->data, MHE_SOURCE_CHANGED, t->slot,
+                         "a stream is another from here on, as when it was recorded");
+        }
+    }
+}
+
+/* The grants of this packet's frames. */
+static void add_grants(recording *s, mhe_chunk *chunk) {
+    const mhe_recorded *r = s->arrivals;
+    const int64_t first = s->next_grant;
+    while (s->next_grant < r->n_grants && grant_at(r, s->next_grant)->arrival == s->next_arrival) {
+        s->next_grant++;
+    }
+    if (s->config.granted && s->next_grant > first) {
+        chunk->n_grants = (int32_t)(s->next_grant - first);
+        chunk->grant_size = r->grant_size;
+        chunk->grants = grant_at(r, first);
+    }
+}
 
 static void repeat(recording *s, double deadline, const mhe_source_taker *taker) {
     while (!s->ended && (s->config.speed == 0 || now() < deadline)) {
@@ -190,14 +234,15 @@ static void repeat(recording *s, double deadline, const mhe_source_taker *taker)
                 }
             }
         }
-        const mhe_chunk chunk = {.size = sizeof chunk,
-                                 .stream = a->stream,
-                                 .n = a->n,
-                                 .received = a->received,
-                                 .stamp = a->has_stamp ? t->stream->stamp + t->next : NULL,
-                                 .values =
-                                     t->stream->values + t->next * t->stream->about.n_channels};
+        describe_again(s, taker);
+        mhe_chunk chunk = {.size = sizeof chunk,
+                           .stream = t->slot,
+                           .n = a->n,
+                           .received = a->received,
+                           .stamp = a->has_stamp ? t->stream->stamp + t->next : NULL,
+                           .values = t->stream->values + t->next * t->stream->about.n_channels};
         s->offset = a->offset;
+        add_grants(s, &chunk);
         t->next += a->n;
         s->next_arrival++;
         taker->chunk(taker->data, &chunk);
@@ -272,7 +317,7 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
         /* at another speed the stamps are those of the recording, and run with it */
         s->offset = speed > 0 ? s->begun - s->first : 0;
         const mhe_chunk chunk = {.size = sizeof chunk,
-                                 .stream = i,
+                                 .stream = t->slot,
                                  .n = n,
                                  .received = now(),
                                  .stamp = t->stream->stamp + t->next,
@@ -321,6 +366,9 @@ static const mhe_option recording_options[] = {
     MHE_OPT_REAL(struct recording_config, speed, 1, 0, 1000, "1",
                  "1: by the clock; 2: twice as fast; 0: as fast as it is taken."),
     MHE_OPT_BOOL(struct recording_config, loop, 0, "Begin again at the end."),
+    MHE_OPT_BOOL(struct recording_config, granted, 1,
+                 "A recording of mhe-live: each frame may do the work that it could do then, "
+                 "whatever the clock says now, so that the same config gives the same bits."),
 };
 
 static const mhe_plugin recording_plugin = {

@@ -51,6 +51,14 @@ MHE_API mhe_status mhe_live_run(mhe_live *live, double seconds, mhe_error *err);
 /* Ends the run soon. NULL is fine. [any], also from a signal handler */
 MHE_API void mhe_live_stop(mhe_live *live);
 
+/* Asks for something by a line: "record-start", "record-stop", "mvc-start ELECTRODE", "mvc-stop",
+ * "label CAME=MODEL" (what a stream calls CAME is the model's MODEL; a stream that has a MODEL of
+ * its own has it as CAME from then on), "stop". It is done between two frames; what comes of it is
+ * told to the host. MHE_E_ARGUMENT: no such line; MHE_RETRY: too many at once. [any] */
+MHE_API mhe_status mhe_live_command(mhe_live *live, const char *line, mhe_error *err);
+/* The run's state as one line of JSON, as sinks have it; to be freed by mhe_free. [any] */
+MHE_API mhe_status mhe_live_state(mhe_live *live, char **json, mhe_error *err);
+
 /* What came of it, as JSON: streams (found, rates, lost, gaps), frames and how they ended,
  * latencies from a sample's stamp to the sinks (p50, p95, p99, max, ms), sinks (given, lost). To be
  * freed by mhe_free. [cold] */

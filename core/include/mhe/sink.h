@@ -61,6 +61,10 @@ typedef struct mhe_sink_sample {
 #define MHE_CONTROL_RECORD_STOP 2
 #define MHE_CONTROL_MVC_START 3 /* `text`: electrode whose maximum is now looked for */
 #define MHE_CONTROL_MVC_STOP 4
+#define MHE_CONTROL_LABEL 5 /* `text`: "CAME=MODEL": what the stream calls CAME is MODEL */
+/* Their names, in this order: of a page's messages and of mhe_live_command. */
+#define MHE_CONTROL_NAMES \
+    { "stop", "record-start", "record-stop", "mvc-start", "mvc-stop", "label" }
 typedef struct mhe_sink_control {
     uint32_t size;
     void *data;

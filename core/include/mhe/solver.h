@@ -131,6 +131,10 @@ typedef struct mhe_solve_control {
      * take beside it (4 to 6). evaluate() counts for itself. Not while evaluate() runs. May be
      * NULL. */
     int32_t (*spent)(void *budget, int32_t solutions);
+    /* Not 0: the deadline is nearer than `seconds`. Where it is given, it is asked instead of the
+     * clock (a replay answers what was answered once, whatever the clock says), on the thread that
+     * called solve() and not while evaluate() runs. May be NULL. */
+    int32_t (*late)(void *budget, double seconds);
 } mhe_solve_control;
 
 typedef struct mhe_solve_info {

@@ -34,10 +34,24 @@ typedef struct mhe_stream_info {
     int32_t n_channels;
     const char *const *labels; /* [n_channels] */
     const char *const
-        *units;  /* [n_channels], as the sender writes them; "" where it says nothing */
-    double rate; /* nominal, Hz; 0: irregular */
-    int32_t up;  /* markers: the vertical axis, 0..2; -1: the sender does not say */
+        *units;   /* [n_channels], as the sender writes them; "" where it says nothing */
+    double rate;  /* nominal, Hz; 0: irregular */
+    int32_t up;   /* markers: the vertical axis, 0..2; -1: the sender does not say */
+    double delay; /* s that its stamps are known to be late by, beside the config's `delay` */
 } mhe_stream_info;
+
+/* The work that a frame was granted, in a recording of ours: what a replay obeys, so that it looks
+ * at no clock. */
+#define MHE_GRANT_LOOKS 8
+typedef struct mhe_grant {
+    int64_t arrival;  /* number of the packet that the frame's sample came in */
+    int32_t prepared; /* 1: its window was prepared ahead of it */
+    int32_t by_clock; /* 1: it had a deadline */
+    int32_t
+        refused; /* looks at the clock before an evaluation was broken off by it; -1: none was */
+    int32_t looks[MHE_GRANT_LOOKS]; /* looks at the clock that found time left, then such that found
+                                     * none, then time again, ... */
+} mhe_grant;
 
 /* Samples of one stream; lent for the call. */
 typedef struct mhe_chunk {
@@ -47,6 +61,9 @@ typedef struct mhe_chunk {
     double received;      /* s of CLOCK_MONOTONIC at which they were there */
     const double *stamp;  /* [n], s of the sender's clock; NULL: it has none */
     const double *values; /* [n x n_channels], NaN: missing */
+    int32_t n_grants;     /* frames that were estimated of these samples when they were recorded */
+    uint32_t grant_size;  /* stride of `grants` */
+    const mhe_grant *grants; /* [n_grants]; NULL: these are no repetition */
 } mhe_chunk;
 
 #define MHE_SOURCE_LOST 0    /* the stream broke off; the source goes on trying */
@@ -94,6 +111,8 @@ typedef struct mhe_recorded_stream {
     int64_t n;            /* samples */
     const double *stamp;  /* [n], s, increasing unless `arrivals` say how they came */
     const double *values; /* [n x about.n_channels] */
+    int32_t replaces;     /* stream that this is the new description of; -1: none */
+    int64_t from;         /* arrival from which on it is so */
 } mhe_recorded_stream;
 
 /* n samples of a stream, taken together. */
@@ -112,6 +131,9 @@ typedef struct mhe_recorded {
     int64_t n_arrivals; /* 0: the file does not say how its samples came */
     uint32_t arrival_size;
     const mhe_arrival *arrivals;
+    int64_t n_grants; /* in the order of their arrivals */
+    uint32_t grant_size;
+    const mhe_grant *grants;
 } mhe_recorded;
 
 typedef struct mhe_recorded_service {

@@ -8,6 +8,7 @@
 #include "ocp/ocp.h"
 
 #include <mhe/estimator.h>
+#include <mhe/source.h>
 
 /* The description that a run's model section asks for; what the reader skipped goes to `host`. Also
  * after a failure the caller gives back what is in `*description` with mhi_description_free. [cold]
@@ -34,6 +35,10 @@ void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
 void mhi_estimator_set_node(mhe_estimator *estimator, int32_t node); /* output.node */
 void mhi_estimator_set_deadline(mhe_estimator *estimator, double seconds);
 void mhi_estimator_set_outlier(mhe_estimator *estimator, double distance);
+/* The next push obeys `grant` (and mhe_estimator_prepare before it), whatever the clock says; NULL:
+ * as ever. What the last push was granted. */
+void mhi_estimator_grant(mhe_estimator *estimator, const mhe_grant *grant);
+void mhi_estimator_granted(const mhe_estimator *estimator, mhe_grant *grant);
 /* While *stop is not 0 every push that would solve ends at once without an estimate, one in work
  * too: MHE_E_INTERRUPTED. Lent; may be set by a signal handler. */
 void mhi_estimator_set_stop(mhe_estimator *estimator, const atomic_int *stop);

@@ -330,6 +330,17 @@ void mhi_estimator_set_deadline(mhe_estimator *e, double seconds) {
     e->pace.budget = seconds;
 }
 
+void mhi_estimator_grant(mhe_estimator *e, const mhe_grant *grant) {
+    e->pace.is_granted = grant != NULL;
+    if (grant != NULL) {
+        e->pace.granted = *grant;
+    }
+}
+
+void mhi_estimator_granted(const mhe_estimator *e, mhe_grant *grant) {
+    *grant = e->pace.looks.grant;
+}
+
 void mhi_estimator_set_stop(mhe_estimator *e, const atomic_int *stop) {
     e->stop = stop;
     mhi_ocp_set_stop(e->ocp, stop);

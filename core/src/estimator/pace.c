@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/estimator_private.h"
 
-#include "base/clock.h"
-
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,8 +32,21 @@
 /* Of the time to a deadline: what lies between an evaluation that ends late and the estimate. */
 #define GRACE 1.03
 
-static int32_t by_clock(const mhe_estimator *e) {
-    return e->pace.budget > 0;
+/* What is granted to the next frame decides over its preparation, too. */
+int32_t mhi_pace_by_clock(const mhe_estimator *e) {
+    return e->pace.is_granted    ? e->pace.granted.by_clock
+           : e->pace.looks.obeys ? e->pace.looks.grant.by_clock
+                                 : e->pace.budget > 0;
+}
+
+int32_t mhi_pace_late(void *estimator, double seconds) {
+    mhe_estimator *e = estimator;
+    return mhi_looks_late(&e->pace.looks, e->pace.arrival + e->pace.budget, seconds,
+                          mhi_ocp_work(e->ocp));
+}
+
+static int32_t look(void *estimator) {
+    return mhi_pace_late(estimator, 0);
 }
 
 void mhi_pace_create(mhe_estimator *e) {
@@ -48,13 +59,14 @@ void mhi_pace_measure(mhe_estimator *e) {
     if (p->n_frames > 0 || p->all_first > FIRST * e->window.n) {
         return;
     }
+    mhi_pace_tick(e);
     (void)mhi_ocp_predict(e->ocp, 0, e->window.guess_x, e->window.guess_u, e->window.solution.x,
                           NULL);
     const double taken = (double)(mhi_work_done(mhi_ocp_work(e->ocp)) - before);
     const double times = fmin(fmax(taken / PLAIN, 1), DEARER);
     p->first += (times - 1) * p->all_first;
     p->all_first *= times;
-    if (!by_clock(e)) { /* the frame in work takes part in it */
+    if (!mhi_pace_by_clock(e)) { /* the frame in work takes part in it */
         int64_t more = (int64_t)((times - 1) * p->all_first / times);
         mhi_work_return(mhi_ocp_work(e->ocp), &more);
     }
@@ -71,16 +83,22 @@ static void begin_work(mhe_estimator *e, double most) {
 void mhi_pace_begin(mhe_estimator *e) {
     mhi_pace *p = &e->pace;
     p->settled = mhi_phase_settled(e);
-    if (by_clock(e)) {
-        mhi_work_begin(mhi_ocp_work(e->ocp), 0, p->arrival + GRACE * p->budget);
+    mhi_work *work = mhi_ocp_work(e->ocp);
+    const int32_t timed = mhi_pace_by_clock(e), obeys = p->is_granted;
+    if (timed) {
+        mhi_work_begin(work, 0, obeys ? 0 : p->arrival + GRACE * p->budget);
+        work->look = look;
+        work->looker = e;
     } else {
         begin_work(e, p->usual > 0 ? SOLVE * p->usual : first_share(e));
     }
+    mhi_looks_begin(&p->looks, obeys ? &p->granted : NULL, timed, work);
+    p->is_granted = 0;
 }
 
 void mhi_pace_predict(mhe_estimator *e) {
     const mhi_pace *p = &e->pace;
-    if (!by_clock(e)) {
+    if (!mhi_pace_by_clock(e)) {
         begin_work(e, p->usual > 0 ? PREDICT * p->usual : SLICE * first_share(e));
     }
 }
@@ -96,8 +114,7 @@ void mhi_pace_postures(mhe_estimator *e, int32_t begun) {
 }
 
 int32_t mhi_pace_over(mhe_estimator *e) {
-    return by_clock(e) ? mhi_seconds() >= e->pace.arrival + e->pace.budget
-                       : mhi_work_spent(mhi_ocp_work(e->ocp));
+    return mhi_work_spent(mhi_ocp_work(e->ocp));
 }
 
 int32_t mhi_pace_spent(void *estimator, int32_t solutions) {
@@ -109,13 +126,30 @@ int32_t mhi_pace_spent(void *estimator, int32_t solutions) {
 }
 
 void mhi_pace_prepare(mhe_estimator *e) {
-    const double usual = e->pace.usual, times = by_clock(e) ? PREPARE_BY_CLOCK : PREPARE;
+    const double usual = e->pace.usual, times = mhi_pace_by_clock(e) ? PREPARE_BY_CLOCK : PREPARE;
     begin_work(e, usual > 0 ? times * usual : first_share(e));
 }
 
 void mhi_pace_prepared(mhe_estimator *e, double seconds) {
     e->pace.ahead += seconds;
     e->pace.prepared += (double)mhi_work_done(mhi_ocp_work(e->ocp));
+}
+
+void mhi_pace_tick(mhe_estimator *e) {
+    if (mhi_ocp_work(e->ocp)->look != NULL) {
+        (void)look(e);
+    }
+}
+
+void mhi_pace_solved(mhe_estimator *e) {
+    mhi_work *work = mhi_ocp_work(e->ocp);
+    e->pace.over = mhi_pace_over(e);
+    if (mhi_work_is_refused(work)) { /* some intervals had been done by then, who knows which */
+        mhi_ocp_forget(e->ocp);
+    }
+    work->deadline = 0;
+    work->look = NULL;
+    atomic_store_explicit(&work->refused, 0, memory_order_relaxed);
 }
 
 static int by_value(const void *a, const void *b) {
@@ -154,7 +188,7 @@ void mhi_pace_end(mhe_estimator *e, int32_t frame_status) {
     const double work = (double)mhi_work_done(mhi_ocp_work(e->ocp)) + p->prepared;
     const int32_t converged = frame_status == MHE_FRAME_OK && p->settled;
     const int32_t ended =
-        converged || (frame_status == MHE_FRAME_ITERATION_LIMIT && p->settled && !mhi_pace_over(e));
+        converged || (frame_status == MHE_FRAME_ITERATION_LIMIT && p->settled && !p->over);
     if (p->usual == 0) {
         p->first = fmax(p->first - work, 0);
         if (p->first == 0 && !p->first_told && !mhi_phase_settled(e)) {

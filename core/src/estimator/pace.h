@@ -5,6 +5,8 @@
 #ifndef MHI_PACE_H
 #define MHI_PACE_H
 
+#include "estimator/looks.h"
+
 #include <mhe/estimator.h>
 
 #define MHI_PACE_FRAMES 15 /* whose median is usual */
@@ -22,6 +24,10 @@ typedef struct mhi_pace {
     double first, all_first;        /* what is left for the frames until then, and was */
     int32_t first_told;
     int32_t settled; /* the frame in work is no beginning */
+    int32_t over;    /* its time or work was over when it was solved */
+    int32_t is_granted;
+    mhe_grant granted; /* of the next frame, where is_granted */
+    mhi_looks looks;
 } mhi_pace;
 
 void mhi_pace_create(mhe_estimator *e);
@@ -34,9 +40,15 @@ void mhi_pace_predict(mhe_estimator *e);
 /* The search of postures of a window that begins has begun (1) or ended (0): a part of the frame's
  * work is kept for the solve. */
 void mhi_pace_postures(mhe_estimator *e, int32_t begun);
-/* 1: its time or work is over. The second: mhe_solve_control.spent. */
+/* 1: its time or work is over. The others: mhe_solve_control.spent and late. */
 int32_t mhi_pace_over(mhe_estimator *e);
 int32_t mhi_pace_spent(void *estimator, int32_t solutions);
+int32_t mhi_pace_late(void *estimator, double seconds);
+int32_t mhi_pace_by_clock(const mhe_estimator *e); /* the frame in work has a deadline */
+/* Before an evaluation that no look precedes. */
+void mhi_pace_tick(mhe_estimator *e);
+/* The frame in work is solved: what is left to say of it takes no time, and none is looked at. */
+void mhi_pace_solved(mhe_estimator *e);
 /* Ahead of a frame. */
 void mhi_pace_prepare(mhe_estimator *e);
 void mhi_pace_prepared(mhe_estimator *e, double seconds);

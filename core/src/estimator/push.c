@@ -186,6 +186,7 @@ static mhe_status solve_window(mhe_estimator *e, mhe_estimate *estimate, int32_t
     }
     if (status == MHE_OK) {
         status = mhi_window_solve(e, &info, &estimate->status, err);
+        mhi_pace_solved(e);
     }
     if (status == MHE_OK) {
         mhi_trust_solved(e, estimate->status);

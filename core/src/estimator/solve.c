@@ -29,7 +29,7 @@ static void take_back_guess(mhe_estimator *e) {
 /* The model's own prediction from the first state under the guessed controls; where there is no
  * time left for it, the guess, which is the last solution or prediction moved on. */
 static void predict(mhe_estimator *e) {
-    const int32_t late = e->pace.budget > 0 && mhi_pace_over(e);
+    int32_t late = mhi_pace_by_clock(e) && mhi_pace_over(e);
     take_back_guess(e);
     const mhi_window *w = &e->window;
     mhe_solution *s = &e->window.solution;
@@ -42,6 +42,7 @@ static void predict(mhe_estimator *e) {
     mhi_pace_predict(e);
     for (int32_t k = 0; k < e->window.n && !late; k++) {
         double *next = mhi_row(e->window.solution.x, k + 1, e->window.n_x);
+        mhi_pace_tick(e);
         mhe_status status =
             mhi_ocp_predict(e->ocp, k, mhi_row(e->window.solution.x, k, e->window.n_x),
                             mhi_row(e->window.solution.u, k, e->n_u), next, NULL);
@@ -53,11 +54,13 @@ static void predict(mhe_estimator *e) {
 }
 
 static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *err) {
+    const int32_t timed = mhi_pace_by_clock(e);
     const mhe_solve_control control = {
         .size = sizeof control,
-        .deadline = e->pace.budget > 0 ? e->pace.arrival + e->pace.budget : 0,
+        .deadline = timed && !e->pace.looks.obeys ? e->pace.arrival + e->pace.budget : 0,
         .budget = e,
-        .spent = mhi_pace_spent};
+        .spent = mhi_pace_spent,
+        .late = timed ? mhi_pace_late : NULL};
     *info = (mhe_solve_info){.size = sizeof *info};
     return e->solver->solve(e->solver_self, &control, &e->window.solution, info, err);
 }
@@ -162,9 +165,9 @@ static int32_t status_of(const mhe_estimator *e, int32_t outcome) {
     case MHE_SOLVE_ITERATION_LIMIT:
         return e->begin.restarted ? MHE_FRAME_RESTARTED : MHE_FRAME_ITERATION_LIMIT;
     case MHE_SOLVE_DEADLINE:
-        return e->begin.restarted   ? MHE_FRAME_RESTARTED
-               : e->pace.budget > 0 ? MHE_FRAME_DEADLINE
-                                    : MHE_FRAME_ITERATION_LIMIT;
+        return e->begin.restarted     ? MHE_FRAME_RESTARTED
+               : mhi_pace_by_clock(e) ? MHE_FRAME_DEADLINE
+                                      : MHE_FRAME_ITERATION_LIMIT;
     default:
         return MHE_FRAME_PREDICTED;
     }

@@ -122,6 +122,7 @@ static void extend(mhe_estimator *e) {
     double *x = mhi_row(e->window.solution.x, e->window.n, e->window.n_x);
     const double *before = mhi_row(e->window.solution.x, e->window.n - 1, e->window.n_x);
     const double *u = mhi_row(e->window.solution.u, e->window.n - 1, e->n_u);
+    mhi_pace_tick(e);
     mhe_status status = mhi_ocp_extend(e->ocp, e->window.n - 1, before, u, x, NULL);
     for (int32_t i = 0; i < e->window.n_x; i++) { /* with what is carried */
         const double value = status == MHE_OK && isfinite(x[i]) ? x[i] : before[i];

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "live/feed.h"
 
+#include "estimator/create.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,8 +15,6 @@ mhe_status mhi_feed_open(mhi_feed *f, const mhe_host *host, const mhi_run *run,
                          const mhe_description *model, mhe_estimator *estimator, mhe_error *err) {
     *f = (mhi_feed){.info = {.size = sizeof f->info},
                     .estimator = estimator,
-                    .sources = run->sources.uses,
-                    .n_sources = run->sources.n,
                     .driver = -1,
                     .begun = NAN,
                     .last = -INFINITY};
@@ -55,16 +55,16 @@ static void warn(const mhi_feed *f, const char *text) {
 /* A stream that is new, or that is another now. Two of one kind: the first is taken. */
 static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
     mhi_inlet *in = mhi_feed_inlet(f, p->source, p->stream);
-    const double delay = p->source < f->n_sources ? f->sources[p->source].delay : 0;
     if (in == NULL && f->n_inlets == MHI_FEED_INLETS) {
         warn(f, "more than 64 streams: the others are passed over");
         return MHE_OK;
     }
     mhi_inlet fresh;
     mhe_status status =
-        mhi_inlet_open(&f->setup, p->about, p->source, p->stream, delay, &fresh, err);
+        mhi_inlet_open(&f->setup, p->about, p->source, p->stream, p->about->delay, &fresh, err);
     if (status != MHE_OK && f->running) { /* a run goes on without it */
         warn(f, err->text);
+        fresh.channel = -1;
         status = MHE_OK;
     }
     if (status != MHE_OK) {
@@ -148,7 +148,34 @@ static void add_electrodes(mhi_feed *f, double time) {
 
 /* ---- samples ---- */
 
-static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, mhe_error *err) {
+void mhi_feed_prepare(mhi_feed *f) {
+    if (!f->repeats) {
+        f->prepared = 1;
+        (void)mhe_estimator_prepare(f->estimator, NULL);
+    }
+}
+
+/* A repetition's frame has what it had. */
+static void obey(mhi_feed *f, const mhe_grant *grant) {
+    f->repeats |= grant != NULL;
+    mhi_estimator_grant(f->estimator, grant);
+    if (grant != NULL && grant->prepared) {
+        (void)mhe_estimator_prepare(f->estimator, NULL);
+    }
+}
+
+static void tell_granted(mhi_feed *f, double time) {
+    mhe_grant grant;
+    mhi_estimator_granted(f->estimator, &grant);
+    grant.prepared = f->prepared;
+    f->prepared = 0;
+    if (f->pusher != NULL) {
+        f->pusher(f->data, &grant, f->start + time);
+    }
+}
+
+static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_grant *grant,
+                             mhe_error *err) {
     mhe_estimate estimate = {.size = sizeof estimate};
     mhe_error why = {0};
     int32_t ready = 0;
@@ -160,7 +187,9 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, mhe_error 
                              .n_channels = f->info.n_channels,
                              .channels = f->channels};
     f->n_frames++;
+    obey(f, grant);
     const mhe_status status = mhe_estimator_push(f->estimator, &frame, &estimate, &ready, &why);
+    tell_granted(f, time);
     if (status == MHE_E_ARGUMENT) { /* its time does not follow */
         f->n_out_of_order++;
         return MHE_OK;
@@ -207,7 +236,7 @@ static int32_t is_settled(mhi_feed *f, double host_time) {
 }
 
 static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, const double *values,
-                              mhe_error *err) {
+                              const mhe_grant *grant, mhe_error *err) {
     const int32_t is_driver = in == &f->inlets[f->driver];
     const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
     in->newest = smooth;
@@ -225,7 +254,7 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
     const double time = smooth - f->start;
     in->n_samples++;
     mhi_inlet_take(in, f->setup.run, values);
-    return is_driver ? push_frame(f, in, time, err)
+    return is_driver ? push_frame(f, in, time, grant, err)
                      : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
 }
 
@@ -251,10 +280,15 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
     const double offset = p->stamp == NULL ? 0 : offset_of(f, in, p);
     const double period = in->rate > 0 ? 1 / in->rate : 0;
     mhe_status status = MHE_OK;
+    int64_t before = f->n_frames;
+    int32_t next = 0; /* grant */
     for (int32_t k = 0; k < p->n && status == MHE_OK; k++) {
         const double time =
             p->stamp == NULL ? p->received - (p->n - 1 - k) * period : p->stamp[k] + offset;
-        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, err);
+        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels,
+                             next < p->n_grants ? &p->grants[next] : NULL, err);
+        next += f->n_frames > before;
+        before = f->n_frames;
     }
     return status == MHE_OK && in->is_raw ? serve_waiting(f, in, err) : status;
 }

@@ -14,13 +14,15 @@
  */
 typedef void (*mhi_feed_taker)(void *data, const mhe_estimate *estimate, double host_time);
 
+/* Told of every frame that was pushed, estimated or not: what it was granted. */
+typedef void (*mhi_feed_pusher)(void *data, const mhe_grant *grant, double host_time);
+
 typedef struct mhi_feed {
     mhi_inlet_setup setup;
     mhe_estimator_info info;
     mhe_estimator *estimator;
-    const mhi_use *sources; /* [n_sources] */
-    int32_t n_sources;
     mhi_feed_taker taker;
+    mhi_feed_pusher pusher;
     void *data;
     int32_t n_inlets;
     mhi_inlet inlets[MHI_FEED_INLETS];
@@ -32,6 +34,8 @@ typedef struct mhi_feed {
     double last;                   /* s since then, of the last frame */
     double *waiting;               /* ring of frames without the electrodes' EMG */
     int32_t n_waiting, first_waiting;
+    int32_t repeats;         /* what comes is a recording that says what frames were granted */
+    int32_t prepared;        /* since the last frame */
     const double **channels; /* [info.n_channels] of a frame */
     int64_t n_frames, n_estimates, n_out_of_order, n_restarts;
     int64_t n_by_status[8];
@@ -47,6 +51,10 @@ mhe_status mhi_feed_take(mhi_feed *feed, const mhi_packet *packet, mhe_error *er
 /* From now on samples count. MHE_E_INPUT: no stream of markers or joint angles has anything of the
  * model. */
 mhe_status mhi_feed_begin(mhi_feed *feed, mhe_error *err);
+
+/* There is time before the next frame: its window is prepared, unless what comes is a repetition,
+ * which says itself when. */
+void mhi_feed_prepare(mhi_feed *feed);
 
 /* The inlet of a stream; NULL: there is none. */
 mhi_inlet *mhi_feed_inlet(mhi_feed *feed, int32_t source, int32_t stream);

@@ -39,14 +39,17 @@ static double unit_factor(const char *unit, int32_t kind) {
 typedef struct labels {
     mhi_table table;
     char **names; /* [n] its own */
+    char **came;  /* [n] the same as the sender writes them */
     int32_t n;
 } labels;
 
 static void free_labels(labels *l) {
     for (int32_t i = 0; i < l->n; i++) {
         free(l->names[i]);
+        free(l->came == NULL ? NULL : l->came[i]);
     }
     free(l->names);
+    free(l->came);
     free(l->table.path);
 }
 
@@ -61,28 +64,39 @@ static const char *renamed(const mhi_run *run, const char *label) {
     return label;
 }
 
+/* "STER.x": STER */
+static void without_axis(const char *label, int32_t per_label, char *out, size_t room) {
+    (void)snprintf(out, room, "%s", label);
+    const size_t length = strlen(out);
+    if (per_label == 3 && length > 2 && out[length - 2] == '.') {
+        out[length - 2] = '\0';
+    }
+}
+
 static mhe_status make_labels(const mhi_inlet_setup *s, const mhi_stream *about, labels *l,
                               mhe_error *err) {
     const int32_t per_label = about->kind == MHE_STREAM_MARKERS ? 3 : 1;
     *l = (labels){.n = 0};
     l->names = calloc((size_t)about->n_channels + 1, sizeof *l->names);
+    l->came = calloc((size_t)about->n_channels + 1, sizeof *l->came);
     l->table.path = strdup(about->name);
-    for (int32_t i = 0; l->names != NULL && i + per_label <= about->n_channels; i += per_label) {
-        char name[512];
-        (void)snprintf(name, sizeof name, "%s", about->labels[i]);
-        const size_t length = strlen(name);
-        if (per_label == 3 && length > 2 && name[length - 2] == '.') {
-            name[length - 2] = '\0'; /* "STER.x" */
-        }
+    const int has_room = l->names != NULL && l->came != NULL;
+    for (int32_t i = 0; has_room && i + per_label <= about->n_channels; i += per_label) {
+        char name[512], came[512];
+        without_axis(about->labels[i], per_label, name, sizeof name);
+        without_axis(about->came[i], per_label, came, sizeof came);
         l->names[l->n] = strdup(renamed(s->run, name));
-        if (l->names[l->n++] == NULL) {
+        l->came[l->n] = strdup(came);
+        const int whole = l->names[l->n] != NULL && l->came[l->n] != NULL;
+        l->n++;
+        if (!whole) {
             return no_memory(err);
         }
     }
     l->table.labels = l->names;
     l->table.n_labels = l->n;
     l->table.n_columns = l->n * per_label;
-    return l->names == NULL || l->table.path == NULL ? no_memory(err) : MHE_OK;
+    return !has_room || l->table.path == NULL ? no_memory(err) : MHE_OK;
 }
 
 /* Labels of the model that the stream lacks, and of the stream that the model has not. */
@@ -101,7 +115,39 @@ static mhe_status keep_lists(mhi_inlet *in, const labels *l, const char *const *
     }
     for (int32_t i = 0; i < l->n; i++) {
         if (!used[i]) {
-            in->unused[n_unused++] = strdup(l->names[i]);
+            in->unused[n_unused++] = strdup(l->came[i]);
+        }
+    }
+    return MHE_OK;
+}
+
+/* The same for electrodes, which have exactly the names of emg.channels. */
+static mhe_status keep_electrodes(mhi_inlet *in, const mhi_run *run, const mhi_stream *about,
+                                  mhe_error *err) {
+    const int32_t n = run->emg.n_channels;
+    int32_t n_missing = 0, n_unused = 0;
+    in->missing = calloc((size_t)n + 1, sizeof *in->missing);
+    in->unused = calloc((size_t)about->n_channels + 1, sizeof *in->unused);
+    if (in->missing == NULL || in->unused == NULL) {
+        return no_memory(err);
+    }
+    for (int32_t i = 0; i < n; i++) {
+        int32_t found = 0;
+        for (int32_t k = 0; k < about->n_channels; k++) {
+            found |= strcmp(about->labels[k], run->emg.channels[i].name) == 0;
+        }
+        if (!found) {
+            in->missing[n_missing++] = strdup(run->emg.channels[i].name);
+        }
+        in->n_found += found;
+    }
+    for (int32_t k = 0; k < about->n_channels; k++) {
+        int32_t used = 0;
+        for (int32_t i = 0; i < n; i++) {
+            used |= strcmp(about->labels[k], run->emg.channels[i].name) == 0;
+        }
+        if (!used) {
+            in->unused[n_unused++] = strdup(about->came[k]);
         }
     }
     return MHE_OK;
@@ -169,11 +215,10 @@ static mhe_status open_electrodes(const mhi_inlet_setup *s, const mhi_stream *ab
     if (status == MHE_OK) {
         mhi_electrodes_tell(in->electrodes, s->run, about->name, s->host);
     }
-    for (int32_t i = 0; i < n && status == MHE_OK; i++) {
-        for (int32_t k = 0; k < about->n_channels; k++) {
-            in->n_found += strcmp(about->labels[k], s->run->emg.channels[i].name) == 0;
-        }
-    }
+    mhe_error no_lists = {0};
+    const mhe_status listed = keep_electrodes(in, s->run, about, &no_lists);
+    status =
+        status == MHE_OK && listed != MHE_OK ? mhe_fail(err, listed, "%s", no_lists.text) : status;
     in->n_labels = n;
     in->is_raw = 1;
     free(mvc);

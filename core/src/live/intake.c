@@ -17,6 +17,7 @@ struct mhi_intake {
     const mhe_source_ops *ops;
     void *self;
     int32_t number;
+    double delay;
     mhi_mailbox *box;
     pthread_t thread;
     int32_t *channels; /* [count] of each stream, as described last */
@@ -60,6 +61,7 @@ static mhe_status describe(mhi_intake *in, int32_t only, mhe_error *err) {
             return mhe_fail(err, MHE_E_PLUGIN, "a stream without channels or labels");
         }
         in->channels[i] = info.n_channels;
+        info.delay += in->delay;
         mhi_mailbox_put(in->box, mhi_packet_stream(in->number, i, &info));
     }
     return MHE_OK;
@@ -135,7 +137,8 @@ static void *run(void *data) {
 }
 
 mhe_status mhi_intake_start(const mhe_host *host, const mhe_plugin *plugin, const void *config,
-                            int32_t number, mhi_mailbox *box, mhi_intake **intake, mhe_error *err) {
+                            int32_t number, double delay, mhi_mailbox *box, mhi_intake **intake,
+                            mhe_error *err) {
     *intake = NULL;
     mhi_intake *in = calloc(1, sizeof *in);
     if (in == NULL) {
@@ -143,6 +146,7 @@ mhe_status mhi_intake_start(const mhe_host *host, const mhe_plugin *plugin, cons
     }
     in->ops = plugin->ops;
     in->number = number;
+    in->delay = delay;
     in->box = box;
     mhe_error why = {0};
     const mhe_status status = in->ops->create(host, config, &in->self, &why);

@@ -11,9 +11,10 @@
 /* A description of a stream that stays, whatever the source does. */
 typedef struct mhi_stream {
     int32_t kind, n_channels, up;
-    double rate;
+    double rate, delay;
     char *name;
     char **labels, **units; /* [n_channels] */
+    char **came;            /* [n_channels] labels as the sender writes them */
 } mhi_stream;
 
 /* What came, in the order in which it came. */
@@ -37,6 +38,8 @@ struct mhi_packet {
     double *values;    /* [n x n_channels] */
     char *text;        /* of an event */
     mhi_stream *about; /* of a description */
+    int32_t n_grants;
+    mhe_grant *grants; /* [n_grants] of the frames that these samples were, in a repetition; NULL */
 };
 void mhi_packet_free(mhi_packet *packet);
 mhi_packet *mhi_packet_stream(int32_t source, int32_t stream, const mhe_stream_info *info);
@@ -58,9 +61,10 @@ void mhi_mailbox_wake(mhi_mailbox *box); /* whoever waits comes back. [any] */
 typedef struct mhi_intake mhi_intake;
 
 /* Creates the plugin's instance and starts its thread, which connects, tries again where it must,
- * and reads until mhi_intake_stop. [cold] */
+ * and reads until mhi_intake_stop. `delay`: s that all its stamps are late by. [cold] */
 mhe_status mhi_intake_start(const mhe_host *host, const mhe_plugin *plugin, const void *config,
-                            int32_t number, mhi_mailbox *box, mhi_intake **intake, mhe_error *err);
+                            int32_t number, double delay, mhi_mailbox *box, mhi_intake **intake,
+                            mhe_error *err);
 /* Is it connected? Else `missing` says what it waits for. [any] */
 int32_t mhi_intake_ready(mhi_intake *intake, char *missing, size_t room);
 /* Why it has ended for good: MHE_OK while it runs or where its recording has ended. [any] */

@@ -48,7 +48,7 @@ static mhe_status start_sources(mhe_live *l, mhe_error *err) {
     for (int32_t i = 0; i < list->n && status == MHE_OK; i++) {
         mhe_error why = {0};
         status = mhi_intake_start(&l->own_host, list->uses[i].plugin, list->uses[i].config, i,
-                                  l->box, &l->intakes[i], &why);
+                                  list->uses[i].delay, l->box, &l->intakes[i], &why);
         if (status != MHE_OK) {
             return mhi_fail_at(err, status, l->run->tree, list->uses[i].node, "%s", why.text);
         }
@@ -69,6 +69,14 @@ static void take_estimate(void *data, const mhe_estimate *estimate, double host_
     l->work = 1;
 }
 
+static void take_grant(void *data, const mhe_grant *grant, double host_time) {
+    mhe_live *l = data;
+    mhe_error err = {0};
+    if (l->record != NULL && mhi_taping_grant(l->record, grant, host_time, &err) != MHE_OK) {
+        mhi_live_end_record(l, err.text);
+    }
+}
+
 static mhe_status open_estimator(mhe_live *l, mhe_error *err) {
     mhe_status status = mhi_config_model(l->config, &l->model, err);
     if (status == MHE_OK) {
@@ -82,6 +90,7 @@ static mhe_status open_estimator(mhe_live *l, mhe_error *err) {
         mhi_estimator_set_node(l->estimator, l->run->horizon.window); /* of the newest frame */
     }
     l->feed.taker = take_estimate;
+    l->feed.pusher = take_grant;
     l->feed.data = l;
     return status;
 }
@@ -147,6 +156,7 @@ void mhe_live_close(mhe_live *l) {
     }
     (void)pthread_mutex_destroy(&l->mutex);
     free((void *)l->intakes);
+    free(l->edits);
     free(l);
 }
 
@@ -187,8 +197,12 @@ static void keep_stream(mhe_live *l, mhi_packet *p) {
             return;
         }
     }
-    p->next = l->streams;
-    l->streams = p;
+    p->next = NULL; /* in the order in which they were described: the first of a kind counts */
+    mhi_packet **end = &l->streams;
+    while (*end != NULL) {
+        end = &(*end)->next;
+    }
+    *end = p;
 }
 
 static void record_packet(mhe_live *l, const mhi_packet *p) {
@@ -200,7 +214,11 @@ static void record_packet(mhe_live *l, const mhi_packet *p) {
 
 /* ---- the loop ---- */
 
-static mhe_status take_packet(mhe_live *l, mhi_packet *p, mhe_error *err) {
+mhe_status mhi_live_take(mhe_live *l, mhi_packet *p, mhe_error *err) {
+    if (p->kind == MHI_PACKET_STREAM && mhi_live_name(l, p, err) != MHE_OK) {
+        mhi_packet_free(p);
+        return MHE_E_MEMORY;
+    }
     if (l->feed.running || p->kind == MHI_PACKET_STREAM) {
         record_packet(l, p);
     }
@@ -271,7 +289,7 @@ static mhe_status wait_for_streams(mhe_live *l, mhe_error *err) {
             mhi_mailbox_put_back(l->box, p); /* the last source is there: the run's first sample */
             break;
         }
-        status = p == NULL ? MHE_OK : take_packet(l, p, err);
+        status = p == NULL ? MHE_OK : mhi_live_take(l, p, err);
         status = status == MHE_OK ? check_sources(l, &ended, err) : status;
         mhi_live_serve(l);
     }
@@ -293,11 +311,11 @@ mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
         const int idle = mhi_mailbox_waiting(l->box) == 0;
         if (idle && l->work) { /* the time until the next frame */
             l->work = 0;
-            (void)mhe_estimator_prepare(l->estimator, NULL);
+            mhi_feed_prepare(&l->feed);
         }
         mhi_packet *p = mhi_mailbox_take(l->box, now + LOOK);
         if (p != NULL) {
-            status = take_packet(l, p, err);
+            status = mhi_live_take(l, p, err);
         } else {
             status = check_sources(l, &ended, err);
             if (ended == l->run->sources.n) {
@@ -335,7 +353,7 @@ static mhe_status take_descriptions(mhe_live *l, mhe_error *err) {
             p->next = kept;
             kept = p;
         } else if (p != NULL) {
-            status = take_packet(l, p, err);
+            status = mhi_live_take(l, p, err);
         }
         n = 0;
         for (int32_t i = 0; i < l->run->sources.n; i++) {

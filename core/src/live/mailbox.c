@@ -19,10 +19,12 @@ static void free_stream(mhi_stream *s) {
     for (int32_t i = 0; s != NULL && i < s->n_channels; i++) {
         free(s->labels == NULL ? NULL : s->labels[i]);
         free(s->units == NULL ? NULL : s->units[i]);
+        free(s->came == NULL ? NULL : s->came[i]);
     }
     if (s != NULL) {
         free(s->labels);
         free(s->units);
+        free(s->came);
         free(s->name);
         free(s);
     }
@@ -33,6 +35,7 @@ void mhi_packet_free(mhi_packet *p) {
         free_stream(p->about);
         free(p->stamp);
         free(p->values);
+        free(p->grants);
         free(p->text);
         free(p);
     }
@@ -66,20 +69,34 @@ mhi_packet *mhi_packet_stream(int32_t source, int32_t stream, const mhe_stream_i
     s->n_channels = info->n_channels;
     s->up = info->up;
     s->rate = info->rate;
+    s->delay = info->delay;
     s->name = copy(info->name);
     s->labels = calloc((size_t)info->n_channels + 1, sizeof *s->labels);
     s->units = calloc((size_t)info->n_channels + 1, sizeof *s->units);
-    int whole = s->name != NULL && s->labels != NULL && s->units != NULL;
+    s->came = calloc((size_t)info->n_channels + 1, sizeof *s->came);
+    int whole = s->name != NULL && s->labels != NULL && s->units != NULL && s->came != NULL;
     for (int32_t i = 0; i < info->n_channels && whole; i++) {
         s->labels[i] = copy(info->labels[i]);
         s->units[i] = copy(info->units == NULL ? NULL : info->units[i]);
-        whole = s->labels[i] != NULL && s->units[i] != NULL;
+        s->came[i] = copy(info->labels[i]);
+        whole = s->labels[i] != NULL && s->units[i] != NULL && s->came[i] != NULL;
     }
     if (!whole) {
         mhi_packet_free(p);
         return NULL;
     }
     return p;
+}
+
+static int copy_grants(mhi_packet *p, const mhe_chunk *chunk) {
+    p->grants = calloc((size_t)chunk->n_grants + 1, sizeof *p->grants);
+    for (int32_t i = 0; i < chunk->n_grants && p->grants != NULL; i++) {
+        const char *at = (const char *)chunk->grants + (size_t)i * chunk->grant_size;
+        memcpy(&p->grants[i], at,
+               chunk->grant_size < sizeof *p->grants ? chunk->grant_size : sizeof *p->grants);
+    }
+    p->n_grants = p->grants == NULL ? 0 : chunk->n_grants;
+    return p->grants != NULL;
 }
 
 mhi_packet *mhi_packet_samples(int32_t source, int32_t n_channels, const mhe_chunk *chunk) {
@@ -101,6 +118,10 @@ mhi_packet *mhi_packet_samples(int32_t source, int32_t n_channels, const mhe_chu
         memcpy(p->stamp, chunk->stamp, sizeof(double) * n);
     }
     memcpy(p->values, chunk->values, sizeof(double) * numbers);
+    if (chunk->size >= sizeof *chunk && chunk->grants != NULL && !copy_grants(p, chunk)) {
+        mhi_packet_free(p);
+        return NULL;
+    }
     return p;
 }
 

@@ -13,7 +13,7 @@
 #include <string.h>
 #include <time.h>
 
-#define RING 256   /* estimates; a power of two */
+#define RING 1024  /* estimates; a power of two: ten seconds that a file may stall */
 #define HEAD 6     /* numbers of a record before the values */
 #define IDLE 0.001 /* s without an estimate */
 #define LATENCIES 4096

@@ -17,6 +17,7 @@ typedef struct owned {
     mhi_table *table;
     mhe_recorded_stream *streams;
     mhe_arrival *arrivals;
+    mhe_grant *grants;
     char ***labels; /* [n_streams][channels], its own */
     const char ***units;
     int32_t *n_labels;
@@ -39,6 +40,7 @@ static void recorded_free(const mhe_recorded *recorded) {
     free(o->n_labels);
     free(o->streams);
     free(o->arrivals);
+    free(o->grants);
     mhi_table_free(o->table);
     mhi_xdf_free(o->xdf);
     free(o);
@@ -97,6 +99,7 @@ static mhe_status from_table(owned *o, int32_t kind, mhe_error *err) {
                                                         .units = o->units[0],
                                                         .rate = t->rate,
                                                         .up = -1},
+                                              .replaces = -1,
                                               .n = t->n_rows,
                                               .stamp = t->time,
                                               .values = t->values};
@@ -131,6 +134,7 @@ static mhe_status add_xdf_stream(owned *o, const mhi_xdf_stream *s, int as_it_ca
                                                         .units = o->units[i],
                                                         .rate = s->rate,
                                                         .up = -1},
+                                              .replaces = -1,
                                               .n = s->n_samples,
                                               .stamp = as_it_came ? s->stamp : s->time,
                                               .values = s->values};
@@ -138,15 +142,70 @@ static mhe_status add_xdf_stream(owned *o, const mhi_xdf_stream *s, int as_it_ca
     return status;
 }
 
-static const mhi_xdf_stream *find_arrivals(const mhi_xdf *xdf) {
+/* One of the streams that we add to what came; NULL: it is no recording of ours. */
+static const mhi_xdf_stream *find_ours(const mhi_xdf *xdf, const char *type, int32_t n_columns) {
     for (int32_t i = 0; i < xdf->n_streams; i++) {
         const mhi_xdf_stream *s = &xdf->streams[i];
-        if (strcmp(s->type, MHI_ARRIVALS) == 0 && s->n_channels == MHI_ARRIVAL_COLUMNS &&
-            s->values != NULL) {
+        if (strcmp(s->type, type) == 0 && s->n_channels == n_columns && s->values != NULL) {
             return s;
         }
     }
     return NULL;
+}
+
+static int32_t whole(double value, double least, double most) {
+    return value >= least && value <= most ? (int32_t)value : (int32_t)least;
+}
+
+/* What frames were granted, in the order of their packets. */
+static mhe_status take_grants(owned *o, mhe_error *err) {
+    const mhi_xdf_stream *s = find_ours(o->xdf, MHI_GRANTS, MHI_GRANT_COLUMNS);
+    if (s == NULL) {
+        return MHE_OK;
+    }
+    o->grants = calloc((size_t)s->n_samples + 1, sizeof *o->grants);
+    if (o->grants == NULL) {
+        return no_memory(err);
+    }
+    int64_t last = 0;
+    for (int64_t k = 0; k < s->n_samples; k++) {
+        const double *row = s->values + k * MHI_GRANT_COLUMNS;
+        mhe_grant *g = &o->grants[k];
+        if (!(row[0] >= (double)last && row[0] < (double)o->face.n_arrivals)) {
+            return mhe_fail(err, MHE_E_INPUT, "%s: frame %lld is of no packet that is there",
+                            o->xdf->path, (long long)k);
+        }
+        last = (int64_t)row[0];
+        *g = (mhe_grant){last, row[1] != 0, row[2] != 0, whole(row[3], -1, INT32_MAX), {0}};
+        for (int32_t i = 0; i < MHE_GRANT_LOOKS; i++) {
+            g->looks[i] = whole(row[4 + i], 0, INT32_MAX);
+        }
+    }
+    o->face.grants = o->grants;
+    o->face.n_grants = s->n_samples;
+    return MHE_OK;
+}
+
+/* A stream that was described again is another from then on. */
+static void take_descriptions(owned *o, const int32_t *number, uint32_t most) {
+    const mhi_xdf_stream *s = find_ours(o->xdf, MHI_DESCRIPTIONS, MHI_DESCRIPTION_COLUMNS);
+    for (int64_t k = 0; s != NULL && k < s->n_samples; k++) {
+        const double *row = s->values + k * MHI_DESCRIPTION_COLUMNS;
+        const int32_t i = row[0] >= 1 && row[0] <= most ? number[(uint32_t)row[0]] : -1;
+        if (i < 0) {
+            continue;
+        }
+        mhe_recorded_stream *stream = &o->streams[i];
+        stream->about.delay = isfinite(row[4]) ? row[4] : 0;
+        stream->from = row[3] >= 0 && row[3] <= 9e15 ? (int64_t)row[3] : 0;
+        for (int64_t before = k; before-- > 0 && stream->replaces < 0;) {
+            const double *other = s->values + before * MHI_DESCRIPTION_COLUMNS;
+            if (other[1] == row[1] && other[2] == row[2] && other[0] >= 1 && other[0] <= most) {
+                const int32_t j = number[(uint32_t)other[0]];
+                stream->replaces = j < i ? j : -1; /* streams stand in the order of their numbers */
+            }
+        }
+    }
 }
 
 static mhe_status take_arrivals(owned *o, const mhi_xdf_stream *a, const int32_t *number,
@@ -171,7 +230,7 @@ static mhe_status take_arrivals(owned *o, const mhi_xdf_stream *a, const int32_t
 }
 
 static mhe_status from_xdf(owned *o, mhe_error *err) {
-    const mhi_xdf_stream *arrivals = find_arrivals(o->xdf);
+    const mhi_xdf_stream *arrivals = find_ours(o->xdf, MHI_ARRIVALS, MHI_ARRIVAL_COLUMNS);
     uint32_t most = 0;
     for (int32_t i = 0; i < o->xdf->n_streams; i++) {
         most = o->xdf->streams[i].id > most ? o->xdf->streams[i].id : most;
@@ -193,6 +252,8 @@ static mhe_status from_xdf(owned *o, mhe_error *err) {
     }
     if (status == MHE_OK && arrivals != NULL) {
         status = take_arrivals(o, arrivals, number, most, err);
+        status = status == MHE_OK ? take_grants(o, err) : status;
+        take_descriptions(o, number, most);
     }
     free(number);
     return status;
@@ -209,6 +270,7 @@ static mhe_status recorded_read(const char *path, int32_t kind, const mhe_record
     o->face.size = sizeof o->face;
     o->face.stream_size = sizeof *o->streams;
     o->face.arrival_size = sizeof *o->arrivals;
+    o->face.grant_size = sizeof *o->grants;
     mhe_status status;
     if (dot != NULL && strcasecmp(dot, ".xdf") == 0) {
         status = mhi_xdf_read(path, &o->xdf, err);

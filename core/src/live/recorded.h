@@ -13,6 +13,13 @@
 /* A row a frame: time (s), status, iterations. */
 #define MHI_FRAMES "mhe-frames"
 #define MHI_FRAME_COLUMNS 3
+/* A row a frame that was pushed, estimated or not: mhe_grant. */
+#define MHI_GRANTS "mhe-grants"
+#define MHI_GRANT_COLUMNS (4 + MHE_GRANT_LOOKS)
+/* A row a description of a stream: number of the .xdf stream, source, stream of the source,
+ * arrivals before it, delay (s). The same stream once more: it is another from then on. */
+#define MHI_DESCRIPTIONS "mhe-descriptions"
+#define MHI_DESCRIPTION_COLUMNS 5
 
 extern const mhe_recorded_service mhi_recorded_service;
 

@@ -18,11 +18,13 @@ typedef struct entry {
 struct mhi_taping {
     mhi_xdf_writer *writer;
     char *path;
-    uint32_t arrivals, frames;
+    uint32_t arrivals, frames, grants, descriptions;
+    int64_t n_arrivals;
     int32_t n_entries;
     entry entries[2 * MHI_FEED_INLETS];
     double *stamps; /* [room] of samples that have none */
     int32_t room;
+    double last; /* s, of the packet taken last */
 };
 
 static const mhi_xdf_column arrival_columns[MHI_ARRIVAL_COLUMNS] = {{"stream", "1", NULL, NULL},
@@ -32,6 +34,36 @@ static const mhi_xdf_column arrival_columns[MHI_ARRIVAL_COLUMNS] = {{"stream", "
                                                                     {"stamped", "1", NULL, NULL}};
 static const mhi_xdf_column frame_columns[MHI_FRAME_COLUMNS] = {
     {"time", "s", NULL, NULL}, {"status", "1", NULL, NULL}, {"iterations", "1", NULL, NULL}};
+
+static const mhi_xdf_column grant_columns[MHI_GRANT_COLUMNS] = {
+    {"arrival", "1", NULL, NULL},   {"prepared", "1", NULL, NULL},  {"by_clock", "1", NULL, NULL},
+    {"refused", "1", NULL, NULL},   {"in_time", "1", NULL, NULL},   {"late", "1", NULL, NULL},
+    {"in_time_2", "1", NULL, NULL}, {"late_2", "1", NULL, NULL},    {"in_time_3", "1", NULL, NULL},
+    {"late_3", "1", NULL, NULL},    {"in_time_4", "1", NULL, NULL}, {"late_4", "1", NULL, NULL}};
+static const mhi_xdf_column description_columns[MHI_DESCRIPTION_COLUMNS] = {
+    {"id", "1", NULL, NULL},
+    {"source", "1", NULL, NULL},
+    {"stream", "1", NULL, NULL},
+    {"arrivals", "1", NULL, NULL},
+    {"delay", "s", NULL, NULL}};
+
+static mhe_status add_our_streams(mhi_taping *r, const char *title, mhe_error *err) {
+    const struct {
+        const char *type;
+        const mhi_xdf_column *columns;
+        int32_t n;
+        uint32_t *id;
+    } ours[] = {{MHI_ARRIVALS, arrival_columns, MHI_ARRIVAL_COLUMNS, &r->arrivals},
+                {MHI_FRAMES, frame_columns, MHI_FRAME_COLUMNS, &r->frames},
+                {MHI_GRANTS, grant_columns, MHI_GRANT_COLUMNS, &r->grants},
+                {MHI_DESCRIPTIONS, description_columns, MHI_DESCRIPTION_COLUMNS, &r->descriptions}};
+    mhe_status status = MHE_OK;
+    for (size_t i = 0; i < sizeof ours / sizeof *ours && status == MHE_OK; i++) {
+        status = mhi_xdf_add_stream(r->writer, title, ours[i].type, 0, ours[i].columns, ours[i].n,
+                                    NULL, ours[i].id, err);
+    }
+    return status;
+}
 
 mhe_status mhi_taping_open(const char *path, const char *title, mhi_taping **record,
                            mhe_error *err) {
@@ -43,12 +75,7 @@ mhe_status mhi_taping_open(const char *path, const char *title, mhi_taping **rec
     }
     mhe_status status = mhi_xdf_create(path, &r->writer, err);
     if (status == MHE_OK) {
-        status = mhi_xdf_add_stream(r->writer, title, MHI_ARRIVALS, 0, arrival_columns,
-                                    MHI_ARRIVAL_COLUMNS, NULL, &r->arrivals, err);
-    }
-    if (status == MHE_OK) {
-        status = mhi_xdf_add_stream(r->writer, title, MHI_FRAMES, 0, frame_columns,
-                                    MHI_FRAME_COLUMNS, NULL, &r->frames, err);
+        status = add_our_streams(r, title, err);
     }
     if (status != MHE_OK) {
         (void)mhi_taping_close(r, NULL);
@@ -86,9 +113,15 @@ static mhe_status add_stream(mhi_taping *r, const mhi_packet *p, mhe_error *err)
     }
     entry *e = &r->entries[r->n_entries++];
     *e = (entry){p->source, p->stream, s->n_channels, 0, 0};
-    const mhe_status status = mhi_xdf_add_stream(r->writer, s->name, types[s->kind & 3], s->rate,
-                                                 columns, s->n_channels, NULL, &e->id, err);
+    mhe_status status = mhi_xdf_add_stream(r->writer, s->name, types[s->kind & 3], s->rate, columns,
+                                           s->n_channels, NULL, &e->id, err);
     free(columns);
+    const double row[MHI_DESCRIPTION_COLUMNS] = {e->id, p->source, p->stream, (double)r->n_arrivals,
+                                                 s->delay};
+    if (status == MHE_OK) {
+        status =
+            mhi_xdf_put(r->writer, r->descriptions, MHI_DESCRIPTION_COLUMNS, 1, &r->last, row, err);
+    }
     return status;
 }
 
@@ -116,6 +149,8 @@ static mhe_status add_samples(mhi_taping *r, const mhi_packet *p, mhe_error *err
         status = mhi_xdf_put_offset(r->writer, e->id, stamps[0], p->offset, err);
     }
     e->n_taken += p->n;
+    r->n_arrivals++;
+    r->last = p->received;
     if (status == MHE_OK) {
         status =
             mhi_xdf_put(r->writer, r->arrivals, MHI_ARRIVAL_COLUMNS, 1, &p->received, row, err);
@@ -133,6 +168,16 @@ mhe_status mhi_taping_frame(mhi_taping *r, const mhe_estimate *estimate, double 
                             mhe_error *err) {
     const double row[MHI_FRAME_COLUMNS] = {estimate->time, estimate->status, estimate->iterations};
     return mhi_xdf_put(r->writer, r->frames, MHI_FRAME_COLUMNS, 1, &host_time, row, err);
+}
+
+mhe_status mhi_taping_grant(mhi_taping *r, const mhe_grant *grant, double host_time,
+                            mhe_error *err) {
+    double row[MHI_GRANT_COLUMNS] = {(double)(r->n_arrivals - 1), grant->prepared, grant->by_clock,
+                                     grant->refused};
+    for (int32_t i = 0; i < MHE_GRANT_LOOKS; i++) {
+        row[4 + i] = grant->looks[i];
+    }
+    return mhi_xdf_put(r->writer, r->grants, MHI_GRANT_COLUMNS, 1, &host_time, row, err);
 }
 
 const char *mhi_taping_path(const mhi_taping *r) {

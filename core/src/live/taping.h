@@ -16,6 +16,9 @@ mhe_status mhi_taping_take(mhi_taping *record, const mhi_packet *packet, mhe_err
 /* A frame as it was estimated. [cold] */
 mhe_status mhi_taping_frame(mhi_taping *record, const mhe_estimate *estimate, double host_time,
                             mhe_error *err);
+/* What the frame of the packet taken last was granted. [cold] */
+mhe_status mhi_taping_grant(mhi_taping *record, const mhe_grant *grant, double host_time,
+                            mhe_error *err);
 mhe_status mhi_taping_close(mhi_taping *record, mhe_error *err); /* NULL is fine. [cold] */
 const char *mhi_taping_path(const mhi_taping *record);
 

@@ -368,7 +368,7 @@ mhe_status mhi_system_markers(mhi_system_context *c, const double *q, double *ma
                               double *marker_q, mhe_error *err) {
     const mhe_kinematics out = {.size = sizeof out, .marker = marker, .marker_q = marker_q};
     if (c->work != NULL) { /* bounded by itself: never refused */
-        (void)mhi_work_take(c->work, marker_q != NULL ? 2 : 1, &c->loan);
+        (void)mhi_work_count(c->work, marker_q != NULL ? 2 : 1, &c->loan);
     }
     return c->system->model->kinematics(c->model, q, c->zero, &out, err);
 }

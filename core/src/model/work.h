@@ -21,16 +21,26 @@ typedef struct mhi_work {
     int64_t most;
     int64_t before;  /* done since it was made, up to the last begin */
     double deadline; /* s of CLOCK_MONOTONIC; 0: none */
+    atomic_int
+        refused; /* since begin: the deadline broke something off, and nothing is given now */
+    int32_t (*look)(
+        void *looker); /* who answers mhi_work_spent beside the account; NULL: the clock */
+    void *looker;
 } mhi_work;
 
-/* `most` 0: no bound. [hot] */
+/* `most` 0: no bound. Nobody but the clock is asked until `look` is set. [hot] */
 void mhi_work_begin(mhi_work *work, int64_t most, double deadline);
 /* Since then, without what is on loan; and in all. */
 int64_t mhi_work_done(const mhi_work *work);
 int64_t mhi_work_total(const mhi_work *work);
-int32_t mhi_work_spent(const mhi_work *work); /* 1: nothing is left, or it is too late */
+/* 1: nothing is left, or it is too late. On the thread that began it alone. */
+int32_t mhi_work_spent(const mhi_work *work);
+void mhi_work_refuse(mhi_work *work); /* nothing more is given until the next begin */
+int32_t mhi_work_is_refused(const mhi_work *work);
 /* Takes from the account, `*loan` first. 0: there is no more. */
 int32_t mhi_work_take(mhi_work *work, int64_t units, int64_t *loan);
+/* The same whatever the clock says. */
+int32_t mhi_work_count(mhi_work *work, int64_t units, int64_t *loan);
 void mhi_work_return(mhi_work *work, int64_t *loan);
 
 #endif
