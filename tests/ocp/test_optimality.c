@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Solutions of a solver, whichever (RIG_SOLVER): optimality, signs of multipliers, warm start, real size. */
+/* Solutions of a solver, whichever (RIG_SOLVER): optimality, signs of multipliers, warm start, real
+ * size. */
 #include "solver_rig.h"
 #include "support.h"
 
