@@ -107,13 +107,23 @@ static double distance3(const double *a, const double *b) {
 
 /* One piece that wrap w may go over: what became of it in `string`. */
 static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, const course_stop *a,
-                        const course_stop *b, const route_work *work, wrap_string *string) {
+                        const course_stop *b, route_work *work, wrap_string *string) {
     const double *tried = work->tried + 6 * w;
     const wrap_string *last = before > 0 ? &work->strings[w] : NULL;
     if (last != NULL && memcmp(tried, a->at, sizeof a->at) == 0 &&
         memcmp(tried + 3, b->at, sizeof b->at) == 0) {
         *string = *last;
         return before;
+    }
+    if (work->pushes && (a->wrap >= 0 || b->wrap >= 0)) {
+        /* where another string ends inside, the two may push each other aside */
+        double ends[2][3];
+        memcpy(ends[0], a->at, sizeof ends[0]);
+        memcpy(ends[1], b->at, sizeof ends[1]);
+        int pushed = a->wrap >= 0 && string_clears(route, w, work, ends[0]);
+        pushed |= b->wrap >= 0 && string_clears(route, w, work, ends[1]);
+        work->pushed |= pushed;
+        return string_between(route, w, ends[0], ends[1], last, work, string);
     }
     return string_between(route, w, a->at, b->at, last, work, string);
 }
@@ -122,12 +132,14 @@ static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, cons
 static int wrap_insert(const path_route *route, int32_t w, route_work *work) {
     const route_wrap *wrap = &route->wraps[w];
     int32_t from, to, best = -1, before = work->state[w], now = WRAP_NONE, which = 0;
+    int32_t blocker = -1;
     double least = INFINITY;
     wrap_string strings[2]; /* the one tried, the best one */
     if (before > 0) {
         stops_remove(work, w);
     }
     work->state[w] = WRAP_NONE;
+    work->blocker[w] = -1;
     if (stops_range(wrap, work, &from, &to) != 0) {
         return before <= 0;
     }
@@ -139,6 +151,9 @@ static int wrap_insert(const path_route *route, int32_t w, route_work *work) {
         int32_t state = wrap_try(route, w, before, a, b, work, &strings[which]);
         if (best < 0 && now != WRAP_INSIDE) {
             now = state; /* of what does not wrap, the first that is inside is told */
+            if (state == WRAP_INSIDE) {
+                blocker = string_off(route, w, work, a->at) < 0 ? a->wrap : b->wrap;
+            }
         }
         double longer =
             state > 0 ? wrap_length(&strings[which]) - distance3(a->at, b->at) : INFINITY;
@@ -153,6 +168,7 @@ static int wrap_insert(const path_route *route, int32_t w, route_work *work) {
         }
     }
     work->state[w] = now;
+    work->blocker[w] = blocker;
     if (best < 0) {
         return before <= 0;
     }
@@ -197,26 +213,23 @@ static int course_has_joints(const route_work *work) {
 static void wraps_insert(const path_route *route, route_work *work) {
     uint64_t last = 0;
     int32_t calm = 0; /* wraps in turn that stayed where they were: all of them, and it is done */
-    for (int32_t w = 0; w < route->n_wraps; w++) {
-        work->order[w] = w;
-        work->state[w] = WRAP_NONE;
-    }
     for (int32_t pass = 0; pass < MAX_PASSES; pass++) {
-        for (int32_t k = 0; k < route->n_wraps; k++) {
+        for (int32_t k = 0; k < work->n_order; k++) {
             calm = wrap_insert(route, work->order[k], work) ? calm + 1 : 0;
-            if (pass > 0 && calm >= route->n_wraps) {
+            if (pass > 0 && calm >= work->n_order) {
                 return;
             }
         }
         uint64_t digest = stops_digest(work);
-        if (route->n_wraps < 2 || (digest == last && (pass > 1 || !course_has_joints(work)))) {
+        if (work->n_order < 2 || (digest == last && (pass > 1 || !course_has_joints(work)))) {
             return;
         }
         last = digest;
-        if (pass == 0 && work->state[0] == WRAP_NONE && work->state[1] == WRAP_INSIDE) {
+        if (pass == 0 && work->state[0] == WRAP_NONE && work->state[1] == WRAP_INSIDE &&
+            work->n_order == route->n_wraps) {
             work->order[0] = 1; /* what the first is in the way of comes first */
             work->order[1] = 0;
-        } else if (calm >= route->n_wraps) {
+        } else if (calm >= work->n_order) {
             return;
         }
     }
@@ -269,8 +282,9 @@ static void strings_renew(const path_route *route, route_work *work) {
     }
 }
 
-void course_find(const path_route *route, const path_pose *pose, const double *numbers,
-                 route_work *work) {
+/* The points that are on, and no wraps. */
+static void points_insert(const path_route *route, const path_pose *pose, const double *numbers,
+                          route_work *work) {
     work->n_stops = 0;
     for (int32_t k = 0; k < route->n_points; k++) {
         if (!point_is_on(route->points[k].source, numbers)) {
@@ -281,15 +295,93 @@ void course_find(const path_route *route, const path_pose *pose, const double *n
         *stop = (course_stop){.point = k, .wrap = -1, .link = route->points[k].place->link};
         memcpy(stop->at, work->places + 3 * k, sizeof stop->at);
     }
+}
+
+/* The wrap is not tried again. */
+static void order_bar(route_work *work, int32_t w) {
+    int32_t n = 0;
+    for (int32_t k = 0; k < work->n_order; k++) {
+        if (work->order[k] != w) {
+            work->order[n++] = work->order[k];
+        }
+    }
+    work->n_order = n;
+}
+
+/* Whether no string of a row ends inside the next one's obstacle. */
+static int course_is_clear(const path_route *route, const route_work *work) {
+    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
+        int32_t u = work->pieces[i].wrap, w = work->pieces[i + 1].wrap;
+        if (work->pieces[i].joint[1] < 0 || work->pieces[i + 1].joint[0] < 0) {
+            continue;
+        }
+        if ((work->state[u] > 0 && string_off(route, w, work, work->strings[u].b) < 0) ||
+            (work->state[w] > 0 && string_off(route, u, work, work->strings[w].a) < 0)) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* A wrap that is on the course but without a string, or was in the way of one without being on it;
+ * -1: none. The last in the order goes first. */
+static int32_t order_idle(const route_work *work) {
+    for (int32_t k = work->n_order - 1; k >= 0; k--) {
+        int32_t u = work->order[k];
+        if (work->state[u] > 0) {
+            continue;
+        }
+        for (int32_t i = 0; i < work->n_stops; i++) {
+            if (work->stops[i].wrap == u) {
+                return u;
+            }
+        }
+        for (int32_t m = 0; m < work->n_order; m++) {
+            int32_t w = work->order[m];
+            if (work->state[w] == WRAP_INSIDE && work->blocker[w] == u) {
+                return u;
+            }
+        }
+    }
+    return -1;
+}
+
+/* The course without what holds no string. 0: each string of a row is clear of the others. */
+static int course_try(const path_route *route, const path_pose *pose, const double *numbers,
+                      int pushes, route_work *work) {
+    int32_t idle = -1;
+    work->pushes = pushes;
+    work->pushed = 0;
+    work->n_order = route->n_wraps;
+    for (int32_t w = 0; w < route->n_wraps; w++) {
+        work->order[w] = w;
+    }
+    do {
+        for (int32_t w = 0; w < route->n_wraps; w++) {
+            work->state[w] = WRAP_NONE;
+            work->blocker[w] = -1;
+        }
+        points_insert(route, pose, numbers, work);
+        wraps_insert(route, work);
+        pieces_make(route, work);
+        if (route->n_wraps > 1) {
+            strings_renew(route, work);
+        }
+        idle = work->n_joints > 0 ? joints_tighten(route, work) : -1;
+        idle = idle < 0 ? order_idle(work) : idle;
+        if (idle >= 0) {
+            order_bar(work, idle);
+        }
+    } while (idle >= 0);
+    return course_is_clear(route, work) ? 0 : -1;
+}
+
+void course_find(const path_route *route, const path_pose *pose, const double *numbers,
+                 route_work *work) {
     for (int32_t w = 0; w < route->n_wraps; w++) {
         place_obstacle(&route->wraps[w], pose, work->obstacles + 12 * w);
     }
-    wraps_insert(route, work);
-    pieces_make(route, work);
-    if (route->n_wraps > 1) {
-        strings_renew(route, work);
-    }
-    if (work->n_joints > 0) {
-        joints_tighten(route, work);
+    if (course_try(route, pose, numbers, route->n_wraps > 1, work) != 0 && work->pushed) {
+        (void)course_try(route, pose, numbers, 0, work);
     }
 }

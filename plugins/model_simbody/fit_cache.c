@@ -15,9 +15,8 @@
 
 #define MAGIC 0x32746966656d6800u /* "mhefit2", backwards */
 #define MOST 4096                 /* of any count in a file */
-#define LENGTHS                                                                      \
-    3 /* to be raised with every change of lengths or fits: older files are not read \
-       */
+/* to be raised with every change of lengths or fits: older files are not read */
+#define LENGTHS 4
 
 /* ---- digest ---- */
 

@@ -39,6 +39,23 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
     return state;
 }
 
+double string_off(const path_route *route, int32_t w, const route_work *work, const double *at) {
+    double x[3];
+    into_frame(work->obstacles + 12 * w, at, x);
+    return wrap_outside(&route->wraps[w].surface, x);
+}
+
+int string_clears(const path_route *route, int32_t w, const route_work *work, double *at) {
+    const double *frame = work->obstacles + 12 * w;
+    double x[3];
+    into_frame(frame, at, x);
+    if (!wrap_clears(&route->wraps[w].surface, x)) {
+        return 0;
+    }
+    place3(frame, frame + 9, x, at);
+    return 1;
+}
+
 void piece_ends(const route_work *work, const course_piece *piece, const double *ends[2]) {
     for (int e = 0; e < 2; e++) {
         ends[e] = piece->joint[e] >= 0 ? work->joints[piece->joint[e]].at
@@ -95,7 +112,7 @@ static double faded_length(const path_route *route, const route_work *work,
     const wrap_string *string = &work->strings[piece->wrap];
     int moves[2] = {end_moves(route, piece, 0), end_moves(route, piece, 1)};
     double p[3], s[3], transposed[9];
-    if (!moves[0] && !moves[1] && surface->kind != MHE_OBSTACLE_CYLINDER) {
+    if (!moves[0] && !moves[1] && surface->kind != MHE_OBSTACLE_CYLINDER && !string->held) {
         return -1;
     }
     wrap_string local = *string;

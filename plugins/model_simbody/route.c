@@ -260,6 +260,7 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->stops, sizeof(course_stop) * n_s},
                  {&out->pieces, sizeof(course_piece) * n_s},
                  {&out->state, sizeof(int32_t) * n_w},
+                 {&out->blocker, sizeof(int32_t) * n_w},
                  {&out->order, sizeof(int32_t) * n_w}};
     size_t total = 64, n_parts = sizeof parts / sizeof parts[0];
     for (size_t i = 0; i < n_parts; i++) {

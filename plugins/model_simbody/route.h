@@ -90,9 +90,12 @@ typedef struct route_work {
     wrap_string *strings; /* [n_wraps], in ground */
     int32_t *state;       /* [n_wraps] of wrap_solve() */
     double *tried;        /* [n_wraps x 6]: the ends that these are of */
-    int32_t *order;       /* [n_wraps] */
-    course_joint *joints; /* [n_wraps] */
-    course_piece *pieces; /* [n_points + 2 n_wraps] */
+    int32_t *order;       /* [n_wraps]: those that may be on, in the order tried */
+    int32_t n_order;
+    int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */
+    int32_t pushes, pushed; /* see wrap_try(): whether it may, whether it did */
+    course_joint *joints;   /* [n_wraps] */
+    course_piece *pieces;   /* [n_points + 2 n_wraps] */
     int32_t n_joints, n_pieces;
     double *newton; /* [(2 n_wraps) x (2 n_wraps + 1)] */
     strand_step *steps[2];
@@ -159,8 +162,14 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
 /* A joint between the strings that end at this stop and begin at the next. */
 void joint_begin(const route_work *work, int32_t stop, course_joint *joint);
 
-/* Moves the joints until the strings are tight. */
-void joints_tighten(const path_route *route, route_work *work);
+/* Distance of a point of ground from the obstacle of wrap w, as wrap_outside(). */
+double string_off(const path_route *route, int32_t w, const route_work *work, const double *at);
+
+/* Moves a point of ground that is inside the obstacle of wrap w to beside it; 1: it did. */
+int string_clears(const path_route *route, int32_t w, const route_work *work, double *at);
+
+/* Moves the joints until the strings are tight. A wrap for which there is no string, or -1. */
+int32_t joints_tighten(const path_route *route, route_work *work);
 
 /* Length of the course found, with gradient and hessian (NULL: not wanted; rows of *stride) by the
  * own coordinates. */

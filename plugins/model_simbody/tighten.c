@@ -8,20 +8,25 @@
 #include <math.h>
 #include <string.h>
 
-#define MAX_NEWTON 20
-#define TIGHT 1e-13  /* m: last step of Newton's method */
+#define MAX_NEWTON 40
+#define MAX_HALVINGS 12
+#define MAX_CLEAR 20
+#define OFF_CENTRE 0.2
+#define FINE 1e-6    /* m: steps that lengths cannot judge */
+#define TIGHT 1e-8   /* m: last step of Newton's method */
 #define LONGEST 0.02 /* m: longest step */
 
-void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
-    const course_stop *a = &work->stops[stop], *b = &work->stops[stop + 1];
+/* In the middle between b and a, across the way from one to the other; `t`: its direction where
+ * they are all but the same. */
+static void joint_put(course_joint *joint, const double *b, const double *a, const double *t) {
     double u[3], least[3] = {0, 0, 0}, norm = 0;
     for (int i = 0; i < 3; i++) {
-        joint->at[i] = 0.5 * (a->at[i] + b->at[i]);
-        u[i] = b->at[i] - a->at[i];
+        joint->at[i] = 0.5 * (b[i] + a[i]);
+        u[i] = a[i] - b[i];
     }
     norm = sqrt(dot3(u, u));
-    for (int i = 0; i < 3; i++) { /* (nearly no distance: along the string) */
-        u[i] = norm > 1e-9 ? u[i] / norm : work->strings[a->wrap].t[1][i];
+    for (int i = 0; i < 3; i++) {
+        u[i] = norm > 1e-9 ? u[i] / norm : t[i];
     }
     int k = fabs(u[0]) <= fabs(u[1]) ? (fabs(u[0]) <= fabs(u[2]) ? 0 : 2)
                                      : (fabs(u[1]) <= fabs(u[2]) ? 1 : 2);
@@ -32,6 +37,11 @@ void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
         joint->across[0][i] /= norm;
     }
     cross3(u, joint->across[0], joint->across[1]);
+}
+
+void joint_begin(const route_work *work, int32_t stop, course_joint *joint) {
+    const course_stop *a = &work->stops[stop], *b = &work->stops[stop + 1];
+    joint_put(joint, a->at, b->at, work->strings[a->wrap].t[1]);
     joint->link = a->link;
 }
 
@@ -91,38 +101,140 @@ static int newton_solve(double *m, int32_t n) {
     return 0;
 }
 
-void joints_tighten(const path_route *route, route_work *work) {
+/* Solves the strings between the joints; their length together. INFINITY: one has none, *lost. */
+static double joints_length(const path_route *route, route_work *work, int32_t *lost) {
+    double length = 0;
+    for (int32_t i = 0; i < work->n_pieces; i++) {
+        const course_piece *piece = &work->pieces[i];
+        const double *ends[2];
+        int32_t w = piece->wrap;
+        if (piece->joint[0] < 0 && piece->joint[1] < 0) {
+            continue;
+        }
+        piece_ends(work, piece, ends);
+        wrap_string last = work->strings[w];
+        work->state[w] = string_between(route, w, ends[0], ends[1],
+                                        work->state[w] > 0 ? &last : NULL, work, &work->strings[w]);
+        if (work->state[w] < 0) {
+            *lost = w;
+            return INFINITY;
+        }
+        length += piece_length(route, work, piece, ends, NULL, NULL, NULL, NULL);
+    }
+    return length;
+}
+
+/* Newton's step in the last column; `shift` is added to the second derivatives. 0: there is one. */
+static int joints_step(const path_route *route, route_work *work, double shift) {
     int32_t n = 2 * work->n_joints, stride = n + 1;
-    for (int32_t k = 0; k <= MAX_NEWTON; k++) {
-        memset(work->newton, 0, sizeof *work->newton * (size_t)(n * stride));
-        for (int32_t i = 0; i < work->n_pieces; i++) {
-            const course_piece *piece = &work->pieces[i];
-            if (piece->joint[0] < 0 && piece->joint[1] < 0) {
-                continue;
-            }
+    memset(work->newton, 0, sizeof *work->newton * (size_t)(n * stride));
+    for (int32_t i = 0; i < work->n_pieces; i++) {
+        const course_piece *piece = &work->pieces[i];
+        if (piece->joint[0] >= 0 || piece->joint[1] >= 0) {
             const double *ends[2];
-            int32_t w = piece->wrap;
             piece_ends(work, piece, ends);
-            wrap_string last = work->strings[w];
-            work->state[w] =
-                string_between(route, w, ends[0], ends[1], work->state[w] > 0 ? &last : NULL, work,
-                               &work->strings[w]);
             newton_add(route, work, stride, piece, ends, work->newton);
         }
-        double step = 0;
-        if (k == MAX_NEWTON || newton_solve(work->newton, n) != 0) {
-            return;
+    }
+    for (int32_t j = 0; j < n; j++) {
+        work->newton[j * stride + j] += shift;
+    }
+    return newton_solve(work->newton, n);
+}
+
+static void joints_move(route_work *work, double share) {
+    int32_t n = 2 * work->n_joints;
+    for (int32_t j = 0; j < n; j++) {
+        course_joint *joint = &work->joints[j / 2];
+        add3(joint->at, share * work->newton[j * (n + 1) + n], joint->across[j % 2]);
+    }
+}
+
+/* Joints that are near the end of the straight way between their strings, beyond which they could
+ * not follow, are put into its middle. Returns the length then. */
+static double joints_centre(const path_route *route, route_work *work, double length,
+                            int32_t *lost) {
+    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
+        int32_t j = work->pieces[i].joint[1], u = work->pieces[i].wrap;
+        int32_t w = work->pieces[i + 1].wrap;
+        if (j < 0 || j != work->pieces[i + 1].joint[0] || work->state[u] <= 0 ||
+            work->state[w] <= 0) {
+            continue;
         }
-        for (int32_t j = 0; j < n; j++) {
-            step = fmax(step, fabs(work->newton[j * stride + n]));
+        const wrap_string *before = &work->strings[u], *after = &work->strings[w];
+        double way[2] = {before->straight[1], after->straight[0]};
+        if (fmin(way[0], way[1]) > OFF_CENTRE * (way[0] + way[1])) {
+            continue;
         }
-        if (step < TIGHT) {
-            return;
-        }
-        double share = step > LONGEST ? LONGEST / step : 1;
-        for (int32_t j = 0; j < n; j++) {
-            course_joint *joint = &work->joints[j / 2];
-            add3(joint->at, share * work->newton[j * stride + n], joint->across[j % 2]);
+        course_joint last = work->joints[j];
+        joint_put(&work->joints[j], before->b, after->a, before->t[1]);
+        double now = joints_length(route, work, lost);
+        if (now <= length * (1 + 1e-12)) {
+            length = now;
+        } else {
+            work->joints[j] = last;
+            length = joints_length(route, work, lost);
         }
     }
+    return length;
+}
+
+/* A joint that is inside one of its obstacles is put beside it. */
+static void joints_clear(const path_route *route, route_work *work) {
+    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
+        const course_piece *before = &work->pieces[i], *after = before + 1;
+        if (before->joint[1] < 0 || before->joint[1] != after->joint[0]) {
+            continue;
+        }
+        double *at = work->joints[before->joint[1]].at;
+        for (int k = 0; k < MAX_CLEAR; k++) {
+            int moved = string_clears(route, before->wrap, work, at);
+            moved |= string_clears(route, after->wrap, work, at);
+            if (!moved) {
+                break;
+            }
+        }
+    }
+}
+
+int32_t joints_tighten(const path_route *route, route_work *work) {
+    static const double shifts[] = {0, 30, 300, 3e3, 3e4}; /* 1/m */
+    int32_t lost = -1, n = 2 * work->n_joints;
+    joints_clear(route, work);
+    double length = joints_length(route, work, &lost);
+    for (int32_t k = 0; k < MAX_NEWTON && isfinite(length); k++) {
+        length = joints_centre(route, work, length, &lost);
+        size_t s = 0;
+        while (s < sizeof shifts / sizeof shifts[0] && joints_step(route, work, shifts[s]) != 0) {
+            s++;
+        }
+        double step = 0, now = INFINITY;
+        for (int32_t j = 0; j < n; j++) {
+            step = fmax(step, fabs(work->newton[j * (n + 1) + n]));
+        }
+        if (isnan(step)) {
+            break;
+        }
+        double share = step > LONGEST ? LONGEST / step : 1;
+        double least = length * (1 + (step < FINE ? 1e-12 : 0)); /* rounding of lengths */
+        joints_move(work, share);
+        for (int half = 0; half < MAX_HALVINGS; half++) {
+            now = joints_length(route, work, &lost);
+            if (now <= least) {
+                break;
+            }
+            joints_move(work, -0.5 * share);
+            share *= 0.5;
+        }
+        if (!(now <= least)) { /* no way down: at the end of the digits, or in a cleft */
+            joints_move(work, -share);
+            (void)joints_length(route, work, &lost);
+            break;
+        }
+        length = now;
+        if (step < TIGHT) { /* the next one would be its square */
+            break;
+        }
+    }
+    return isfinite(length) ? -1 : lost;
 }

@@ -23,7 +23,7 @@
 static const struct {
     const char *name;
     int jumps;
-} jumping[] = {{"arm26", 1}, {"MOBL_ARMS_41", 13}, {"ThoracoscapularShoulderModel", 4}};
+} jumping[] = {{"MOBL_ARMS_41", 4}, {"ThoracoscapularShoulderModel", 3}};
 static const char *const models[] = {"arm26",
                                      "gait10dof18musc",
                                      "subject01_metabolics_path_spring",

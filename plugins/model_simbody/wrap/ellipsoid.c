@@ -17,6 +17,10 @@
 #define TRIED 3   /* strings solved exactly at most */
 #define NEAR 0.03 /* of the length: planes that are not worse than that may hold the shortest */
 #define OUTSIDE 1e-9
+#define PASSES 4
+#define SURE 0.6       /* twice what it begins to let go at (fade.h), by the fan's measure */
+#define PASS_TURN 0.15 /* rad */
+#define SAME 1e-9      /* of a length: the same string */
 #define HALF_TURN 3.141592653589793
 
 typedef struct fan {
@@ -167,7 +171,7 @@ static void fan_string_at(const fan *f, const double *half_plane, int axis, fan_
 }
 
 static int solve_from(const wrap_surface *surface, const double *p, const double *s, const fan *f,
-                      double angle, wrap_string *out) {
+                      double angle, int passes, wrap_string *out) {
     contact_circle circle;
     fan_string guess;
     double from[3], turn;
@@ -180,15 +184,16 @@ static int solve_from(const wrap_surface *surface, const double *p, const double
     string_start start = {.contact = circle_contact,
                           .data = &circle,
                           .turn = atan2(dot3(from, circle.axes[1]), dot3(from, circle.axes[0])),
-                          .arc = guess.arc};
+                          .arc = guess.arc,
+                          .passes = passes};
     return string_shoot(surface, p, s, &start, &turn, out);
 }
 
-/* The angle of the shortest of the fan's strings near the k-th, by a parabola. */
+/* The angle of the shortest, or longest, of the fan's strings near the k-th, by a parabola. */
 static double fan_angle(const fan_string *strings, int k) {
     double before = strings[(k + FAN - 1) % FAN].length, here = strings[k].length;
     double after = strings[(k + 1) % FAN].length, curve = before - 2 * here + after;
-    double shift = curve > 0 ? 0.5 * (before - after) / curve : 0;
+    double shift = curve != 0 ? 0.5 * (before - after) / curve : 0;
     return (k + fmax(-0.5, fmin(0.5, shift))) * (2 * HALF_TURN / FAN);
 }
 
@@ -214,10 +219,11 @@ static int shortest_of(const wrap_surface *surface, const double *p, const doubl
         wrap_string string;
         tried[best] = 1;
         least = fmin(least, strings[best].length);
-        if (solve_from(surface, p, s, f, fan_angle(strings, best), &string) == 0 &&
+        if (solve_from(surface, p, s, f, fan_angle(strings, best), 0, &string) == 0 &&
             wrap_length(&string) < shortest) {
             shortest = wrap_length(&string);
             *out = string;
+            out->held = 0;
         }
     }
     return isfinite(shortest);
@@ -240,31 +246,113 @@ static int solve_near(const wrap_surface *surface, const double *p, const double
     return string_shoot(surface, p, s, &start, &turn, out);
 }
 
-int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
-                   const wrap_string *guess, wrap_string *out) {
+static void fan_spread(const fan *f, int axis, fan_string *strings) {
     static const double half_planes[FAN][2] = {
         {1, 0},  {0.8660254037844386, 0.5},   {0.5, 0.8660254037844386},
         {0, 1},  {-0.5, 0.8660254037844386},  {-0.8660254037844386, 0.5},
         {-1, 0}, {-0.8660254037844386, -0.5}, {-0.5, -0.8660254037844386},
         {0, -1}, {0.5, -0.8660254037844386},  {0.8660254037844386, -0.5}};
+    for (int k = 0; k < FAN; k++) {
+        fan_string_at(f, half_planes[k], axis, &strings[k]);
+    }
+}
+
+static int fan_lowest(const fan_string *strings) {
+    int lowest = 0;
+    for (int k = 1; k < FAN; k++) {
+        lowest = strings[k].length < strings[lowest].length ? k : lowest;
+    }
+    return lowest;
+}
+
+int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
+                   const wrap_string *guess, wrap_string *out) {
     fan f;
     fan_string strings[FAN];
     int needs = fan_of(surface, p, s, &f), axis = surface->side_axis;
     int allowed[FAN], any = 0;
-    if (needs != WRAP_CROSSED ||
-        (guess != NULL && solve_near(surface, p, s, &f, guess, out) == 0)) {
+    if (needs != WRAP_CROSSED) {
         return needs;
     }
+    if (guess != NULL && solve_near(surface, p, s, &f, guess, out) == 0) {
+        out->held = guess->held;
+        return needs;
+    }
+    fan_spread(&f, axis, strings);
     for (int k = 0; k < FAN; k++) {
-        fan_string_at(&f, half_planes[k], axis, &strings[k]);
         allowed[k] = axis < 0 || strings[k].apex * surface->side_sign >= 0;
         any |= allowed[k];
     }
     if (any && shortest_of(surface, p, s, &f, strings, allowed, out)) {
+        out->held = !allowed[fan_lowest(strings)];
         return needs;
     }
     for (int k = 0; k < FAN; k++) { /* no string holds on that side */
         allowed[k] = 1;
     }
     return shortest_of(surface, p, s, &f, strings, allowed, out) ? needs : WRAP_UNSOLVED;
+}
+
+/* The highest string of the fan on the way from the k-th to the lowest one, in steps of `way`. */
+static int fan_top(const fan_string *strings, int k, int lowest, int way) {
+    int top = k;
+    for (int i = k; i != lowest; i = (i + FAN + way) % FAN) {
+        top = strings[i].length > strings[top].length ? i : top;
+    }
+    return top;
+}
+
+/* The pass near the fan's highest string, from there on in steps of `way`. 0: found. */
+static int pass_of(const wrap_surface *surface, const double *p, const double *s, const fan *f,
+                   const fan_string *strings, int top, int way, double above, wrap_string *out) {
+    double angle = fan_angle(strings, top);
+    for (int try = 0; try < PASSES; try++) {
+        if (solve_from(surface, p, s, f, angle + way * try * PASS_TURN, 1, out) == 0 &&
+            wrap_length(out) > above) {
+            return 0;
+        }
+    }
+    return -1;
+}
+
+int wrap_slips(const wrap_surface *surface, const double *p, const double *s,
+               const wrap_string *held, wrap_string *shortest, wrap_string *pass) {
+    fan f;
+    fan_string strings[FAN];
+    int all[FAN], k = 0, found = 0;
+    double near = INFINITY, least = INFINITY, length = wrap_length(held);
+    if (!held->held || fan_of(surface, p, s, &f) != WRAP_CROSSED) {
+        return 0;
+    }
+    fan_spread(&f, -1, strings);
+    for (int i = 0; i < FAN; i++) {
+        double square = 0;
+        for (int j = 0; j < 3; j++) {
+            double d = strings[i].a[j] - held->a[j] / f.size[j];
+            square += d * d;
+        }
+        k = square < near ? i : k;
+        near = fmin(near, square);
+        all[i] = 1;
+    }
+    int lowest = fan_lowest(strings),
+        tops[2] = {fan_top(strings, k, lowest, -1), fan_top(strings, k, lowest, 1)};
+    double lower = fmin(strings[tops[0]].length, strings[tops[1]].length);
+    if (lower - strings[k].length > SURE * (strings[k].length - strings[lowest].length) ||
+        !shortest_of(surface, p, s, &f, strings, all, shortest) ||
+        !(wrap_length(shortest) < length * (1 - SAME))) {
+        return 0; /* (held by far; by nothing) */
+    }
+    for (int e = 0; e < 2; e++) {
+        wrap_string string;
+        if (strings[tops[e]].length < lower * (1 + NEAR) &&
+            pass_of(surface, p, s, &f, strings, tops[e], 2 * e - 1, length, &string) == 0 &&
+            wrap_length(&string) < least) {
+            least = wrap_length(&string);
+            *pass = string;
+            pass->held = 0;
+            found = 1;
+        }
+    }
+    return found;
 }

@@ -7,8 +7,10 @@
 #include <math.h>
 #include <string.h>
 
-#define N 6       /* coordinates of both ends */
-#define GONE 1e-5 /* of the way over which it fades: nothing that counts is left */
+#define N 6        /* coordinates of both ends */
+#define CLEAR 0.02 /* of the radius */
+#define DEEP 0.1   /* of the radius */
+#define GONE 1e-5  /* of the way over which it fades: nothing that counts is left */
 
 typedef struct jet {
     double value, slope[N], curve[N][N];
@@ -100,8 +102,7 @@ static void outside_jet(const wrap_surface *surface, const double *p, const doub
     out->value -= surface->kind == MHE_OBSTACLE_ELLIPSOID ? least : surface->size[0];
 }
 
-/* The same, the value alone. */
-static double outside(const wrap_surface *surface, const double *x) {
+double wrap_outside(const wrap_surface *surface, const double *x) {
     const double *size = surface->size;
     switch (surface->kind) {
     case MHE_OBSTACLE_SPHERE:
@@ -117,6 +118,41 @@ static double outside(const wrap_surface *surface, const double *x) {
         return sqrt(off * off + x[2] * x[2]) - size[0];
     }
     }
+}
+
+int wrap_clears(const wrap_surface *surface, double *x) {
+    const double *size = surface->size;
+    double middle[3] = {0, 0, 0}, d[3], weight[3] = {1, 1, 1}, square = 0;
+    double rho = sqrt(x[0] * x[0] + x[1] * x[1]), radius = size[0];
+    switch (surface->kind) {
+    case MHE_OBSTACLE_CYLINDER:
+        middle[2] = x[2];
+        break;
+    case MHE_OBSTACLE_TORUS:
+        middle[0] = rho > 0 ? size[1] * x[0] / rho : size[1];
+        middle[1] = rho > 0 ? size[1] * x[1] / rho : 0;
+        break;
+    case MHE_OBSTACLE_ELLIPSOID:
+        radius = 1;
+        for (int i = 0; i < 3; i++) {
+            weight[i] = 1 / (size[i] * size[i]);
+        }
+        break;
+    default:
+        break;
+    }
+    for (int i = 0; i < 3; i++) {
+        d[i] = x[i] - middle[i];
+        square += weight[i] * d[i] * d[i];
+    }
+    double scaled = sqrt(square), wanted = radius * (1 + CLEAR);
+    if (!(scaled < radius * (1 + 0.5 * CLEAR)) || !(scaled > radius * (1 - DEEP))) {
+        return 0;
+    }
+    for (int i = 0; i < 3; i++) {
+        x[i] = middle[i] + wanted / scaled * d[i];
+    }
+    return 1;
 }
 
 static double distance_of(const double *p, const double *s) {
@@ -139,8 +175,11 @@ int wrap_is_off(const wrap_surface *surface, const wrap_string *string) {
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                const wrap_string *string) {
     double excess = wrap_length(string) - distance_of(p, s), off[2];
-    if ((moves[0] && outside(surface, p) < FADE_INSIDE * excess) ||
-        (moves[1] && outside(surface, s) < FADE_INSIDE * excess)) {
+    if (string->held) {
+        return 1;
+    }
+    if ((moves[0] && wrap_outside(surface, p) < FADE_INSIDE * excess) ||
+        (moves[1] && wrap_outside(surface, s) < FADE_INSIDE * excess)) {
         return 1;
     }
     beyond(surface, string, off);
@@ -234,6 +273,33 @@ static void fade_off(const wrap_surface *surface, const double *p, const double 
     jet_add(excess, -1, &share[0], excess);
 }
 
+/* The string's length, less what a pass that is low no longer holds. */
+static void fade_over(const wrap_surface *surface, const double *p, const double *s,
+                      const wrap_string *string, jet *length) {
+    wrap_string strings[2];
+    jet shortest, pass, excess, share;
+    if (!wrap_slips(surface, p, s, string, &strings[0], &strings[1])) {
+        return;
+    }
+    string_jet(&strings[0], &shortest);
+    jet_add(length, -1, &shortest, &excess);
+    double most = FADE_PASS * excess.value, high = wrap_length(&strings[1]) - length->value;
+    if (high >= most) {
+        return;
+    }
+    if (high < GONE * most) {
+        *length = shortest;
+        return;
+    }
+    string_jet(&strings[1], &pass);
+    jet_add(&pass, -1, length, &pass);
+    jet_apply(&excess, most, FADE_PASS, 0, &share);
+    jet_divide(&pass, &share, &share);
+    jet_rise(&share, &share);
+    jet_multiply(&share, &excess, &excess);
+    jet_add(&shortest, 1, &excess, length);
+}
+
 static void jet_out(const jet *x, double *g, double *pp, double *ps, double *ss) {
     if (g != NULL) {
         memcpy(g, x->slope, sizeof x->slope);
@@ -250,12 +316,14 @@ double wrap_faded(const wrap_surface *surface, const double *p, const double *s,
     jet length, straight, excess, h;
     double off[2], most = FADE_INSIDE * (wrap_length(string) - distance_of(p, s));
     straight_jet(p, s, &straight);
-    if ((moves[0] && outside(surface, p) < GONE * most) ||
-        (moves[1] && outside(surface, s) < GONE * most)) { /* its derivatives need not be finite */
+    if ((moves[0] && wrap_outside(surface, p) < GONE * most) ||
+        (moves[1] &&
+         wrap_outside(surface, s) < GONE * most)) { /* its derivatives need not be finite */
         jet_out(&straight, g, pp, ps, ss);
         return straight.value;
     }
     string_jet(string, &length);
+    fade_over(surface, p, s, string, &length);
     jet_add(&length, -1, &straight, &excess);
     beyond(surface, string, off);
     if (surface->kind == MHE_OBSTACLE_CYLINDER && off[0] > 0 && off[1] > 0) {
@@ -263,7 +331,7 @@ double wrap_faded(const wrap_surface *surface, const double *p, const double *s,
     }
     for (int e = 0; e < 2; e++) {
         most = FADE_INSIDE * excess.value;
-        if (moves[e] && most > 0 && outside(surface, e ? s : p) < most) {
+        if (moves[e] && most > 0 && wrap_outside(surface, e ? s : p) < most) {
             outside_jet(surface, p, s, e, &h);
             fade_inside(&h, &excess);
         }

@@ -8,6 +8,9 @@
  *     an end that moves, h outside the surface:    E S(h / (k E))
  *     both contacts beyond the cylinder's end,
  *     by x and y, its radius r:                    E (1 - S(x / (m r)) S(y / (m r)))
+ *     held on the side asked for, where the
+ *     string of any side is shorter, by F, and
+ *     the pass between both higher, by b:          E - F + F S(b / (l F))
  * so that what ends inside fades the faster the less it is; the slope does not exceed 15 / (8 k).
  * An end that stays where it is on the obstacle's body never comes in, and fades nothing. */
 #ifndef SIMBODY_FADE_H
@@ -17,6 +20,7 @@
 
 #define FADE_INSIDE 0.25 /* k */
 #define FADE_OFF 0.25    /* m */
+#define FADE_PASS 0.25   /* l */
 
 /* Whether a string between p and s, in the obstacle's frame, is fading; `moves`: of either end. */
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
@@ -26,6 +30,13 @@ int wrap_fades(const wrap_surface *surface, const double *p, const double *s, co
  * wanted. */
 double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                   const wrap_string *string, double *g, double *pp, double *ps, double *ss);
+
+/* Distance of a point from the surface, < 0 inside; from an ellipsoid roughly, 0 where it is 0. */
+double wrap_outside(const wrap_surface *surface, const double *x);
+
+/* Moves a point that is inside the obstacle, or hardly outside, to beside it, along the shortest
+ * way or nearly so; 1: it was. */
+int wrap_clears(const wrap_surface *surface, double *x);
 
 /* Whether anything is left of a string over a cylinder. */
 int wrap_is_off(const wrap_surface *surface, const wrap_string *string);

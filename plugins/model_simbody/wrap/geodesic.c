@@ -364,7 +364,7 @@ int string_shoot(const wrap_surface *surface, const double *p, const double *s,
         }
         if (done || !better) { /* not better: the digits end here, or no solution */
             int solved = done || (accuracy == FINE && before < 1e3 * limit);
-            return solved && now.ahead > 0 && now.spread > 0 && arc > -limit &&
+            return solved && now.ahead > 0 && (now.spread > 0) == !start->passes && arc > -limit &&
                            arc < LONGEST * scale
                        ? 0
                        : -1;

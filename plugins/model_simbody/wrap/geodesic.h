@@ -33,6 +33,8 @@ typedef struct string_start {
     const void *data;
     double turn, arc; /* where to begin */
     int near;         /* that is known to be close */
+    int passes;       /* a string is wanted that is shortest along itself and longest across: over
+                       * a pass between two that are tight */
 } string_start;
 
 /* Newton for (turn, arc) such that the string hits s. 0: solved; then *turn is the solution's. */

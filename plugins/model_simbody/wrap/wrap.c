@@ -13,6 +13,7 @@
 
 int wrap_solve(const wrap_surface *surface, const double *p, const double *s,
                const wrap_string *guess, wrap_string *out) {
+    out->held = 0;
     switch (surface->kind) {
     case MHE_OBSTACLE_SPHERE:
         return wrap_sphere(surface, p, s, out);

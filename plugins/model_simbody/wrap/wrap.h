@@ -29,6 +29,7 @@ typedef struct wrap_string {
     double straight[2];      /* d1, d2 */
     double arc;              /* length on the surface */
     double field[4];         /* j, j' at b of (1, 0) at a; of (0, 1) at a */
+    int32_t held;            /* a shorter one may lie on the other side than asked for */
 } wrap_string;
 
 #define WRAP_INSIDE (-1)   /* an end is inside: no wrap */
@@ -41,6 +42,11 @@ typedef struct wrap_string {
  * it is looked for; NULL: none is known. Depends on its arguments alone. [any] */
 int wrap_solve(const wrap_surface *surface, const double *p, const double *s,
                const wrap_string *guess, wrap_string *out);
+
+/* Of a string over an ellipsoid that is held on the side asked for: the shortest string of any side
+ * and the one over the pass between both. 0: it is not held, or by no pass that is found. */
+int wrap_slips(const wrap_surface *surface, const double *p, const double *s,
+               const wrap_string *held, wrap_string *shortest, wrap_string *pass);
 
 double wrap_length(const wrap_string *string);
 
