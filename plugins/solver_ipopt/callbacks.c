@@ -128,9 +128,8 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
     if (control != NULL && control->progress != NULL &&
         control->progress(control->data, iteration, objective, s->kkt_residual)) {
         s->stopped = MHE_SOLVE_INTERRUPTED;
-    } else if (control != NULL &&
-               (is_late(s) ||
-                (control->spent != NULL && control->spent(control->budget, SOLUTIONS)))) {
+    } else if (control != NULL && (is_late(s) || (control->spent != NULL &&
+                                                  control->spent(control->budget, SOLUTIONS)))) {
         s->stopped = MHE_SOLVE_DEADLINE;
     }
     return s->stopped == 0 && s->nlp.failure == MHE_OK;

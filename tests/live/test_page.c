@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A live run in a browser: headless Chromium opens the page and drives it, the official client of
  * Foxglove reads it, strangers are turned away (page.js); the page's numbers are those of the
- * tables. MHE_PAGE_MESSAGES=2000 looks for 20 s; MHE_KEEP_PICTURES=DIR keeps what it looked like. */
+ * tables. MHE_PAGE_MESSAGES=2000 looks for 20 s; MHE_KEEP_PICTURES=DIR keeps what it looked like.
+ */
 #include "live_rig.h"
 
 #include <mhe/library.h>
