@@ -266,7 +266,7 @@ static int32_t set_parameters(rti_solver *s, const double *w) {
 
 int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t wanted) {
     const double start = rti_now();
-    (void)rti_is_late(s, 0); /* a replay knows of each evaluation whether it was cut */
+    rti_tick(s);
     if (!set_parameters(s, point->w)) {
         return 0;
     }
@@ -293,7 +293,7 @@ int32_t rti_evaluate(rti_solver *s, rti_point *point, int32_t wanted) {
 
 double rti_first_gap(rti_solver *s, const double *w) {
     const double start = rti_now();
-    (void)rti_is_late(s, 0);
+    rti_tick(s);
     const rti_worker *of = &s->workers[0];
     const mhe_stage_values out = {.size = sizeof out, .x_next = of->x_next};
     const double *x = w + s->shape.n_u, *next = w + s->shape.ld_z + s->shape.n_u;

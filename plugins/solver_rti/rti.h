@@ -149,6 +149,8 @@ mhe_status rti_covariance(void *self, const mhe_covariance *out, mhe_error *err)
  * asked. */
 int32_t rti_is_spent(rti_solver *s);
 int32_t rti_is_late(const rti_solver *s, double seconds); /* the deadline is nearer than that */
+/* Before an evaluation: a replay then knows of each whether the clock broke it off. */
+void rti_tick(const rti_solver *s);
 
 /* sqp.c */
 mhe_status rti_prepare(void *self, const mhe_solution *start, mhe_error *err);

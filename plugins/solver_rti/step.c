@@ -29,6 +29,13 @@ int32_t rti_is_late(const rti_solver *s, double seconds) {
                : isfinite(s->deadline) && rti_now() + seconds >= s->deadline;
 }
 
+void rti_tick(const rti_solver *s) {
+    const mhe_solve_control *control = s->control;
+    if (control != NULL && control->late != NULL) {
+        (void)control->late(control->budget, 0);
+    }
+}
+
 /* Before each iteration of a program, too. */
 static int32_t is_late(const void *data) {
     rti_solver *s = (rti_solver *)data; /* whose count of solutions is told */
