@@ -8,6 +8,7 @@
 #include <mhe/inspect.h>
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 static mhe_status fail_memory(mhe_error *err) {
@@ -16,9 +17,7 @@ static mhe_status fail_memory(mhe_error *err) {
 
 /* Version of the file's layout, 30000 and so on. */
 static int32_t version_of(mhi_document *d) {
-    int32_t version = 0;
-    (void)sscanf(mhi_xml_attribute(&d->o, d->root, "Version"), "%d", &version);
-    return version;
+    return (int32_t)strtol(mhi_xml_attribute(&d->o, d->root, "Version"), NULL, 10);
 }
 
 /* As a file of 4.0 says where a marker is. */
