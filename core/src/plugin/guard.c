@@ -103,7 +103,8 @@ mhe_status mhi_guard(mhe_status (*call)(void *data), void *data, mhe_error *err)
     guard g = {.outer = innermost};
     if (sigsetjmp(g.back, 0) != 0) {
         innermost = g.outer;
-        if (strcmp(g.type, "std::bad_alloc") == 0) {
+        /* The second is what stands there where the first takes memory that there is not. */
+        if (strcmp(g.type, "std::bad_alloc") == 0 || strcmp(g.type, "St9bad_alloc") == 0) {
             return mhe_fail(err, MHE_E_MEMORY, "out of memory (std::bad_alloc)");
         }
         return g.type[0] != '\0' ? mhe_fail(err, MHE_E_PLUGIN, "threw a C++ exception (%s)", g.type)
