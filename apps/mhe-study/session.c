@@ -2,6 +2,7 @@
 #include "session.h"
 
 #include "identity.h"
+#include "io/outbox_private.h"
 #include "study_json.h"
 #include "trial.h"
 #include <mhe/outbox.h>
@@ -104,6 +105,18 @@ mhe_status session_lock(session *s, int *lock, mhe_error *err) {
                         : take_lock(s, path, 100 * PATIENCE, lock, err);
 }
 
+/* What a run that was killed left half-written: all that is written into this folder is written
+ * under the lock. */
+static mhe_status sweep_folder(const char *dir, mhe_error *err) {
+    mhe_outbox *outbox = NULL;
+    mhe_status status = mhe_outbox_open(dir, &outbox, err);
+    if (status == MHE_OK) {
+        mhi_outbox_sweep(outbox);
+    }
+    mhe_outbox_close(outbox);
+    return status;
+}
+
 mhe_status session_prepare(session *s, const char *out, int quiet, mhe_error *err) {
     s->dir = out == NULL ? mhi_arena_format(&s->arena, "out/%s", s->study.name)
                          : mhi_arena_text(&s->arena, out);
@@ -113,6 +126,7 @@ mhe_status session_prepare(session *s, const char *out, int quiet, mhe_error *er
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                             : make_folder(s->dir, err);
     status = status == MHE_OK ? session_lock(s, &lock, err) : status;
+    status = status == MHE_OK ? sweep_folder(s->dir, err) : status;
     status = status == MHE_OK ? prepare_folder(s, quiet, err) : status;
     status = status == MHE_OK ? make_folder(below, err) : status;
     if (lock >= 0) {

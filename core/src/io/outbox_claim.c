@@ -64,8 +64,7 @@ static int is_temporary(const char *name) {
            strncmp(digits - n_mark, MHI_OUTBOX_MARK, n_mark) == 0;
 }
 
-/* What a run that was killed left behind: no other one is at work here. */
-static void sweep(const mhe_outbox *outbox) {
+void mhi_outbox_sweep(const mhe_outbox *outbox) {
     const int again = openat(outbox->folder, ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     DIR *dir = again < 0 ? NULL : fdopendir(again);
     if (dir == NULL) {
@@ -110,7 +109,7 @@ mhe_status mhe_outbox_claim(mhe_outbox *outbox, const char *const *names, int32_
         outbox->names = names;
         outbox->n_names = n_names;
         note_time(outbox);
-        sweep(outbox);
+        mhi_outbox_sweep(outbox);
     }
     return status;
 }

@@ -22,6 +22,9 @@ struct mhe_outbox {
 void mhi_outbox_unlock(mhe_outbox *outbox);
 /* MHE_OK where `name` may get a file: there is none, or a file (or link) that can be replaced. */
 mhe_status mhi_outbox_check_target(const mhe_outbox *outbox, const char *name, mhe_error *err);
+/* Removes what a run that was killed left half-written in the folder. The caller knows that no
+ * other one is at work here. */
+void mhi_outbox_sweep(const mhe_outbox *outbox);
 
 /* A temporary name is '.' NAME MHI_OUTBOX_MARK, eight hexadecimal digits, MHI_OUTBOX_END. */
 #define MHI_OUTBOX_MARK ".mhe-"
