@@ -3,26 +3,9 @@
 #include "report.h"
 
 #include "base/pi.h"
+#include "escape.h"
 
 #include <math.h>
-
-static void escaped(mhi_text *out, const char *text, size_t n) {
-    for (size_t i = 0; i < n && text[i] != '\0'; i++) {
-        switch (text[i]) {
-        case '<':
-            mhi_text_add(out, "&lt;");
-            break;
-        case '>':
-            mhi_text_add(out, "&gt;");
-            break;
-        case '&':
-            mhi_text_add(out, "&amp;");
-            break;
-        default:
-            mhi_text_add(out, "%c", text[i]);
-        }
-    }
-}
 
 static void cell(mhi_text *out, double value, const char *unit) {
     if (isnan(value)) {
@@ -51,7 +34,7 @@ static void recordings_html(const report_content *r, mhi_text *out) {
         const report_recording *one = &r->recordings[i];
         const held_out *b = &one->before, *a = &one->after;
         mhi_text_add(out, "<tr><td>");
-        escaped(out, one->name, (size_t)-1);
+        add_escaped(out, one->name);
         mhi_text_add(out, "</td><td>%s</td>", one->held_out ? "held out" : "learned from");
         pair(out, 1e3 * b->marker, 1e3 * a->marker, " mm");
         pair(out, b->emg, a->emg, "");
@@ -89,7 +72,7 @@ static void parameters_html(const report_content *r, mhi_text *out) {
     for (int32_t i = 0; i < r->c->n; i++) {
         const mhi_estimated *e = &r->c->list[i];
         mhi_text_add(out, "<tr><td>");
-        escaped(out, e->name, (size_t)-1);
+        add_escaped(out, e->name);
         mhi_text_add(out, "</td><td class=n>%.4g</td><td class=n>%.4g</td><td class=n>%.2g</td>",
                      e->mean, e->value, e->sd);
         band(out, e);
@@ -110,7 +93,7 @@ static void findings_html(const report_content *r, mhi_text *out) {
             n++;
         }
         mhi_text_add(out, "<li>");
-        escaped(out, line, n);
+        add_escaped_part(out, line, n);
         mhi_text_add(out, "</li>\n");
         line += n + (line[n] == '\n');
     }
@@ -130,7 +113,7 @@ void report_html(const report_content *r, mhi_text *out) {
              "10px;border-bottom:1px solid #e2e8f0;text-align:left}td.n{text-align:right;"
              "font-variant-numeric:tabular-nums}.warn{color:#b45309}h1{margin-bottom:0}"
              "</style>\n<h1>Calibration</h1>\n<p>");
-    escaped(out, c->run->name, (size_t)-1);
+    add_escaped(out, c->run->name);
     mhi_text_add(
         out,
         ": %d parameters from %d nodes; %s after %d iterations, %.1f s of the processor. %d of the "

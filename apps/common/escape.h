@@ -7,6 +7,8 @@
 
 /* Between tags and in attributes. */
 void add_escaped(mhi_text *out, const char *text);
+/* The first n characters of it at most. */
+void add_escaped_part(mhi_text *out, const char *text, size_t n);
 /* As a part of an address. */
 void add_escaped_path(mhi_text *out, const char *text);
 

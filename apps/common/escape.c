@@ -4,8 +4,8 @@
 #include <ctype.h>
 #include <string.h>
 
-void add_escaped(mhi_text *out, const char *text) {
-    for (; *text != '\0'; text++) {
+void add_escaped_part(mhi_text *out, const char *text, size_t n) {
+    for (const char *end = text + n; text != end && *text != '\0'; text++) {
         switch (*text) {
         case '<':
             mhi_text_add(out, "&lt;");
@@ -23,6 +23,10 @@ void add_escaped(mhi_text *out, const char *text) {
             mhi_text_add(out, "%c", *text);
         }
     }
+}
+
+void add_escaped(mhi_text *out, const char *text) {
+    add_escaped_part(out, text, strlen(text));
 }
 
 void add_escaped_path(mhi_text *out, const char *text) {
