@@ -134,6 +134,8 @@ typedef struct mhi_bounds_section {
 typedef struct mhi_realtime_section {
     double deadline_ms; /* 0: none */
     int32_t threads;
+    int32_t priority;    /* SCHED_FIFO of a live run's solver; 0: none */
+    int32_t lock_memory; /* of a live run */
 } mhi_realtime_section;
 
 typedef struct mhi_output_section {

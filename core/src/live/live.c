@@ -115,7 +115,7 @@ mhe_status mhe_live_open(mhe_config *config, const mhe_live_setup *setup, mhe_li
     l->folder = setup->folder == NULL ? "." : setup->folder;
     l->wait = setup->wait;
     l->mvc_channel = -1;
-    (void)pthread_mutex_init(&l->mutex, NULL);
+    mhi_priority_mutex(&l->mutex);
     mhe_status status = open_estimator(l, err);
     if (status == MHE_OK) {
         mhi_live_set_control(l);
@@ -296,14 +296,8 @@ static mhe_status wait_for_streams(mhe_live *l, mhe_error *err) {
     return status;
 }
 
-mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
-    if (l == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "there is no live run");
-    }
-    mhe_status status = wait_for_streams(l, err);
-    if (status == MHE_OK && !stopped(l)) {
-        status = mhi_live_begin(l, err);
-    }
+static mhe_status loop(mhe_live *l, double seconds, mhe_error *err) {
+    mhe_status status = MHE_OK;
     double state_told = 0;
     int32_t ended = 0;
     while (status == MHE_OK && !stopped(l)) {
@@ -331,6 +325,22 @@ mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
             break;
         }
     }
+    return status;
+}
+
+mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
+    if (l == NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "there is no live run");
+    }
+    mhe_status status = wait_for_streams(l, err);
+    if (status == MHE_OK && !stopped(l)) {
+        status = mhi_live_begin(l, err);
+    }
+    mhi_priority_take(l->run, l->host, &l->priority);
+    if (status == MHE_OK) {
+        status = loop(l, seconds, err);
+    }
+    mhi_priority_give_back(&l->priority);
     status = status == MHE_E_INTERRUPTED ? MHE_OK : status;
     if (l->record != NULL) {
         mhi_live_end_record(l, NULL);

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mailbox.c: packets and the queue between sources and the estimator's thread. */
 #include "live/intake.h"
+#include "live/priority.h"
 
 #include <math.h>
 #include <pthread.h>
@@ -138,7 +139,7 @@ mhi_mailbox *mhi_mailbox_create(void) {
     mhi_mailbox *box = calloc(1, sizeof *box);
     pthread_condattr_t attributes;
     if (box != NULL) {
-        (void)pthread_mutex_init(&box->mutex, NULL);
+        mhi_priority_mutex(&box->mutex);
         (void)pthread_condattr_init(&attributes);
         (void)pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
         (void)pthread_cond_init(&box->filled, &attributes);

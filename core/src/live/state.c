@@ -128,6 +128,8 @@ mhe_status mhe_live_summary(mhe_live *l, char **json, mhe_error *err) {
         cJSON_AddNumberToObject(c, "late_nodes", (double)counts.n_late_nodes);
         cJSON_AddNumberToObject(c, "dropped", (double)counts.n_dropped);
     }
+    cJSON_AddNumberToObject(root, "priority", l->priority.raised);
+    cJSON_AddBoolToObject(root, "memory_locked", l->priority.locked);
     add_streams(l, root);
     add_sinks(l, root);
     *json = cJSON_Print(root);
