@@ -323,7 +323,7 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
         const mhe_chunk chunk = {.size = sizeof chunk,
                                  .stream = t->slot,
                                  .n = n,
-                                 .received = now(),
+                                 .received = speed > 0 ? now() : stamp,
                                  .stamp = t->stream->stamp + t->next,
                                  .values =
                                      t->stream->values + t->next * t->stream->about.n_channels};

@@ -144,7 +144,7 @@ static int a_mutex(void) {
     pthread_t thread;
     int32_t policy = -1;
     mhi_priority p = take(7, 0);
-    mhi_priority_mutex(&mutex);
+    mhi_priority_mutex(&mutex, 1);
     const int whole = pthread_mutex_lock(&mutex) == 0 && pthread_mutex_unlock(&mutex) == 0 &&
                       pthread_mutex_destroy(&mutex) == 0;
     mhi_priority_give_back(&p);

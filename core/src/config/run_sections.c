@@ -216,6 +216,9 @@ static const mhe_option realtime_options[] = {
         "none."),
     MHE_OPT_BOOL(mhi_realtime_section, lock_memory, 0,
                  "With mhe-live: keep the program's memory from being moved out (mlockall)."),
+    MHE_OPT_REAL(mhi_realtime_section, most_behind, 0.5, 0, 1e6, "s",
+                 "With mhe-live: a frame that has waited longer is passed over, so that on a "
+                 "machine that does not keep up estimates stay of now; 0: none is, however late."),
 };
 
 static const mhe_option output_options[] = {

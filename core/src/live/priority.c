@@ -14,10 +14,11 @@ int32_t mhi_priority_cores(void) {
     return sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
 }
 
-void mhi_priority_mutex(pthread_mutex_t *mutex) {
+void mhi_priority_mutex(pthread_mutex_t *mutex, int32_t inherits) {
     pthread_mutexattr_t attributes;
     (void)pthread_mutexattr_init(&attributes);
-    (void)pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
+    (void)pthread_mutexattr_setprotocol(&attributes,
+                                        inherits ? PTHREAD_PRIO_INHERIT : PTHREAD_PRIO_NONE);
     if (pthread_mutex_init(mutex, &attributes) != 0) { /* the system has no such mutexes */
         (void)pthread_mutex_init(mutex, NULL);
     }

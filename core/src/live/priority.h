@@ -21,8 +21,8 @@ void mhi_priority_give_back(mhi_priority *priority); /* [cold], by the same thre
 /* Cores that this process may use. [any] */
 int32_t mhi_priority_cores(void);
 
-/* A mutex whose holder goes as first as the thread that waits for it: an ordinary thread that holds
- * it cannot keep the solver's waiting behind others. [cold] */
-void mhi_priority_mutex(pthread_mutex_t *mutex);
+/* A mutex; where `inherits`, its holder goes as first as the thread that waits for it: an ordinary
+ * thread that holds it cannot keep the solver's waiting behind others. [cold] */
+void mhi_priority_mutex(pthread_mutex_t *mutex, int32_t inherits);
 
 #endif
