@@ -134,6 +134,9 @@ typedef struct mhi_bounds_section {
 typedef struct mhi_realtime_section {
     double deadline_ms; /* 0: none */
     int32_t threads;
+    int32_t priority;    /* SCHED_FIFO of a live run's solver; 0: none */
+    int32_t lock_memory; /* of a live run */
+    double most_behind;  /* s that a frame of a live run may wait; 0: for ever */
 } mhi_realtime_section;
 
 typedef struct mhi_output_section {
