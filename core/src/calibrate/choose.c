@@ -189,7 +189,7 @@ static mhe_status make_lists(mhi_calibration *c, mhe_error *err) {
     for (int32_t kind = MHI_OF_STRENGTH; kind <= MHI_OF_SLACK; kind++, next += n_m) {
         c->list_of[kind] = next;
     }
-    c->list_of[MHI_OF_INSERTION] = next;
+    c->list_of[MHI_OF_INSERTION] = c->insertions ? next : numbers + n - 3 * n_m;
     next += c->insertions ? 3 * n_m : 0;
     c->list_of[MHI_OF_MASS] = next;
     next += n_b;

@@ -90,6 +90,13 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
     if (c->masses) {
         names[n_names++] = MHI_MASS;
     }
+    const mhi_node *model = mhi_node_find(mhi_tree_root(run->tree), "model");
+    const mhi_node *paths = model == NULL ? NULL : mhi_node_find(model, "paths");
+    if (c->insertions && paths != NULL && paths->text != NULL &&
+        strcmp(paths->text, "fitted") == 0) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, paths,
+                           "model.paths: where insertions are estimated paths must be exact");
+    }
     mhi_bounds bounds;
     mhe_status status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
     const mhi_system_setup setup = {.host = c->host,
