@@ -80,7 +80,7 @@ static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run *
         set[a->set.n] = mhi_arena_format(
             &arena, "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %g}",
             plan.solver == 0 ? "rti" : "ipopt", plan.solver == 0 ? "preset: robust, " : "",
-            (int)plan.max_iterations, fmin(1e-4, plan.tolerance));
+            (int)plan.max_iterations, fmax(1e-12, fmin(1e-4, plan.tolerance)));
         mhi_run_free(*run);
         *run = NULL;
         status = mhi_run_read(a->config, set, a->set.n + 1, registry, run, err);

@@ -180,14 +180,14 @@ def test_where_and_when():
 
 def test_solvers_agree():
     """The bordered recursion against Ipopt on a short recording whose controls stay off their bounds (where Ipopt's are relaxed)."""
-    found = []
+    found = []  # both until the objective does not change: a part of 1e-12 of it is 1e-7 of a gain
     recording = "    - {markers: B/markers.trc, emg: B_emg.sto, reference: B/reference.sto}\n"
     config = re.sub(r"    - \{markers: [AC].*\n", "", CONFIG)
     assert recording in config
     write("agree.yaml", config)
     for solver in ("rti", "ipopt"):
         done = run(CALIBRATE, "agree.yaml", "--out", solver, "--quiet", "--set", "calibrate.solver=" + solver, "--set",
-                   "calibrate.tolerance=1e-12", "--set", "calibrate.max_iterations=200")
+                   "calibrate.tolerance=1e-15", "--set", "calibrate.max_iterations=100")
         assert done.returncode == 0, done.stderr
         with open(solver + "/calibration.json") as file:
             told = json.load(file)
@@ -195,7 +195,7 @@ def test_solvers_agree():
         found.append(told["parameters"])
     moved = [abs(one["after"] - one["before"]) for one in found[0]]
     off = max(abs(one["after"] - other["after"]) for one, other in zip(*found))
-    assert max(moved) > 0.1 and off < 1e-6, (moved, off)
+    assert max(moved) > 0.1 and off < 1e-8, (moved, off)
 
 
 def drop_columns(path, to, names):

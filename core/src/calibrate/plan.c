@@ -29,7 +29,7 @@ static const mhe_option plan_options[] = {
                  "as less than one measurement each."),
     MHE_OPT_ENUM(mhi_plan, solver, "rti", "rti|ipopt", "Which solver."),
     MHE_OPT_INT(mhi_plan, max_iterations, 60, 1, 10000, "1", "Its iterations at most."),
-    MHE_OPT_REAL(mhi_plan, tolerance, 1e-4, 1e-12, 1, "1",
+    MHE_OPT_REAL(mhi_plan, tolerance, 1e-4, 1e-16, 1, "1",
                  "It ends where two iterations change the objective by less than this part."),
 };
 
