@@ -21,6 +21,10 @@ static const struct {
                          {0, 0.003, -0.02, 0.02}, {0.02, 0.02, 0, 0.2}, {1, 0.1, 0.3, 3}};
 
 static const mhe_option plan_options[] = {
+    MHE_OPT_PATH(
+        mhi_plan, scale, 0,
+        "Scale setup (.xml) of OpenSim, done first: its model is scaled to the static trial "
+        "and takes the place of model.file."),
     MHE_OPT_REAL(mhi_plan, body_mass, NAN, 1e-3, 1e4, "kg",
                  "What the person weighs: segment_mass expects the model's masses times the same "
                  "factor, so that they weigh so much together."),
