@@ -178,16 +178,62 @@ def test_where_and_when():
     assert any(abs(delay - early) < 0.004 for delay in delays), delays
 
 
+def expect(what, config, *words):
+    write("bad.yaml", config)
+    done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
+    lines = [line for line in done.stderr.split("\n") if line and "warning" not in line]
+    assert done.returncode == 2, (what, done.returncode, done.stderr)
+    assert len(lines) == 1, (what, done.stderr)
+    for word in words:
+        assert word in lines[0], (what, word, lines[0])
+    assert not os.path.exists("bad/calibrated.osim"), what
+
+
+SETUP = """<OpenSimDocument Version="20302"><ScaleTool name="person"><mass>%s</mass>
+<GenericModelMaker><model_file>%s</model_file></GenericModelMaker>
+<ModelScaler><apply>true</apply><preserve_mass_distribution>true</preserve_mass_distribution>%s</ModelScaler>
+<MarkerPlacer><apply>false</apply></MarkerPlacer></ScaleTool></OpenSimDocument>
+"""
+BY_HAND = """<scaling_order>manualScale</scaling_order><ScaleSet><objects><Scale><scales>0.9 0.9 0.9</scales><segment>Arm</segment>
+<apply>true</apply></Scale></objects></ScaleSet>"""
+BY_MARKERS = """<scaling_order>measurements</scaling_order><MeasurementSet><objects><Measurement name="arm"><apply>true</apply>
+<MarkerPairSet><objects><MarkerPair><markers> DELT EPICl </markers></MarkerPair></objects></MarkerPairSet>
+<BodyScaleSet><objects><BodyScale name="Arm"><axes> X Y Z </axes></BodyScale></objects></BodyScaleSet></Measurement></objects>
+</MeasurementSet><marker_file>A/markers.trc</marker_file><time_range> 0 0.1 </time_range>"""
+
+
+def test_scales_first():
+    """From a generic model whose upper arm is too short: scaled to the markers, then calibrated."""
+    with open("model.osim") as file:
+        mass = sum(float(x) for x in re.findall("<mass>([^<]+)</mass>", file.read()))
+    write("short.xml", SETUP % (mass, "model.osim", BY_HAND))
+    write("person.xml", SETUP % (mass, "short.osim", BY_MARKERS))
+    done = run(os.path.join(os.path.dirname(CALIBRATE), "mhe-model"), "scale", "short.xml", "--out", "short.osim")
+    assert done.returncode == 0, done.stderr
+    write("scaled.yaml", CONFIG.replace("model.osim", "short.osim").replace("calibrate:", "calibrate:\n  scale: person.xml"))
+    done = run(CALIBRATE, "scaled.yaml", "--out", "scaled")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"Arm +1\.1111", done.stderr), done.stderr
+    with open("scaled/calibration.json") as file:
+        told = json.load(file)
+    held = next(r for r in told["recordings"] if r["held_out"])
+    assert held["before"]["q_deg"] > 1 > 20 * held["after"]["q_deg"], held
+    with open("scaled/calibrated.osim") as one, open("model.osim") as other:
+        found, right = point_of(one.read(), "SupraSpin")[0], point_of(other.read(), "SupraSpin")[0]
+    assert max(abs(a - b) for a, b in zip(found, right)) < 1e-5, (found, right)
+    expect("no setup", CONFIG.replace("calibrate:", "calibrate:\n  scale: absent.xml"), "absent.xml")
+
+
 def test_solvers_agree():
     """The bordered recursion against Ipopt on a short recording whose controls stay off their bounds (where Ipopt's are relaxed)."""
-    found = []
+    found = []  # both until the objective does not change: a part of 1e-12 of it is 1e-7 of a gain
     recording = "    - {markers: B/markers.trc, emg: B_emg.sto, reference: B/reference.sto}\n"
     config = re.sub(r"    - \{markers: [AC].*\n", "", CONFIG)
     assert recording in config
     write("agree.yaml", config)
     for solver in ("rti", "ipopt"):
         done = run(CALIBRATE, "agree.yaml", "--out", solver, "--quiet", "--set", "calibrate.solver=" + solver, "--set",
-                   "calibrate.tolerance=1e-12", "--set", "calibrate.max_iterations=200")
+                   "calibrate.tolerance=1e-15", "--set", "calibrate.max_iterations=100")
         assert done.returncode == 0, done.stderr
         with open(solver + "/calibration.json") as file:
             told = json.load(file)
@@ -195,7 +241,7 @@ def test_solvers_agree():
         found.append(told["parameters"])
     moved = [abs(one["after"] - one["before"]) for one in found[0]]
     off = max(abs(one["after"] - other["after"]) for one, other in zip(*found))
-    assert max(moved) > 0.1 and off < 1e-6, (moved, off)
+    assert max(moved) > 0.1 and off < 1e-8, (moved, off)
 
 
 def drop_columns(path, to, names):
@@ -255,17 +301,6 @@ def test_channels():
     assert len(told) == 1 and told[0].startswith("EMG of BRD reaches 1.20 times its MVC"), told
 
 
-def expect(what, config, *words):
-    write("bad.yaml", config)
-    done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
-    lines = [line for line in done.stderr.split("\n") if line and "warning" not in line]
-    assert done.returncode == 2, (what, done.returncode, done.stderr)
-    assert len(lines) == 1, (what, done.stderr)
-    for word in words:
-        assert word in lines[0], (what, word, lines[0])
-    assert not os.path.exists("bad/calibrated.osim"), what
-
-
 def test_wrong_input():
     expect("no section", CONFIG.split("calibrate:")[0], "bad.yaml", "calibrate")
     expect("unknown parameter", CONFIG.replace("emg_gain", "emg_gian"), "bad.yaml:14", "emg_gain")
@@ -305,6 +340,7 @@ def main():
         make_person("ABC")
         test_finds()
         test_where_and_when()
+        test_scales_first()
         test_solvers_agree()
         test_told()
         test_channels()

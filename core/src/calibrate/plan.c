@@ -21,6 +21,10 @@ static const struct {
                          {0, 0.003, -0.02, 0.02}, {0.02, 0.02, 0, 0.2}, {1, 0.1, 0.3, 3}};
 
 static const mhe_option plan_options[] = {
+    MHE_OPT_PATH(
+        mhi_plan, scale, 0,
+        "Scale setup (.xml) of OpenSim, done first: its model is scaled to the static trial "
+        "and takes the place of model.file."),
     MHE_OPT_REAL(mhi_plan, body_mass, NAN, 1e-3, 1e4, "kg",
                  "What the person weighs: segment_mass expects the model's masses times the same "
                  "factor, so that they weigh so much together."),
@@ -29,7 +33,7 @@ static const mhe_option plan_options[] = {
                  "as less than one measurement each."),
     MHE_OPT_ENUM(mhi_plan, solver, "rti", "rti|ipopt", "Which solver."),
     MHE_OPT_INT(mhi_plan, max_iterations, 60, 1, 10000, "1", "Its iterations at most."),
-    MHE_OPT_REAL(mhi_plan, tolerance, 1e-4, 1e-12, 1, "1",
+    MHE_OPT_REAL(mhi_plan, tolerance, 1e-4, 1e-16, 1, "1",
                  "It ends where two iterations change the objective by less than this part."),
 };
 

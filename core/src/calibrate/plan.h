@@ -50,6 +50,7 @@ typedef struct mhi_plan {
     int32_t n_recordings;
     mhi_plan_entry *entries;
     int32_t n_entries;
+    const char *scale; /* a Scale setup; NULL: none */
     double body_mass;  /* kg; NaN: not known */
     double noise_time; /* s that the noise of measurements is alike */
     int32_t solver;    /* 0: mhe.solver.rti, 1: mhe.solver.ipopt */
