@@ -200,6 +200,17 @@ remedied origin 'transform: {shift: [-0.300, -0.150, 0.200]}'
 config glass hinge.bioMod 'markers: glass.trc'
 trc 100 'c[1] = -c[1]; c[4] = -c[4]; c[7] = -c[7]' > glass.trc
 verdict glass no 'those of a mirrored body' 'scale: -1}'
+config hall hinge.bioMod 'markers: hall.trc'
+trc 100 'for (i = 1; i <= 7; i += 3) {y = c[i + 1]; c[i] += 1000; c[i + 1] = -c[i + 2] + 2000; c[i + 2] = y + 3000}' > hall.trc
+refused hall 'turned by 90 degrees' 'data.transform: {rotate: x-90, shift: [-1.000, -3.000, 2.000]}'
+remedied hall 'transform: {rotate: x-90, shift: [-1, -3, 2]}'
+config inches hinge.bioMod 'markers: inches.trc'
+trc 100 'for (i = 1; i <= 9; i++) c[i] /= 25.4' > inches.trc
+verdict inches no 'a body 0.03937 times as large as the model' 'data.transform: {scale: 25.4}'
+remedied inches 'transform: {scale: 25.4}'
+config taller hinge.bioMod 'markers: taller.trc'
+trc 100 'for (i = 1; i <= 9; i++) c[i] *= 1.15' > taller.trc
+verdict taller doubtful 'a body 1.15 times as large as the model' 'scale the model (mhe-model scale)'
 config degrees hinge.bioMod 'angles: degrees.mot' 'q, sigma: 0.005'
 mot 'version=1' $deg > degrees.mot
 refused degrees "degrees.mot:4: 'fore_RotZ' goes from 28.6" "'inDegrees=yes' in the header"

@@ -12,12 +12,14 @@
 #define GAIN 0.5        /* share of the distance that a transform must leave at most ... */
 #define WORTH 0.003     /* m by which it must be nearer at least */
 #define HOPELESS 0.05   /* m RMS: no posture is near */
-#define ROUNDS 40       /* of postures and transform by turns */
+#define ROUNDS 40       /* steps of postures and transform together */
+#define GLANCE 6        /* of them where axes are chosen */
 #define LIKELY 8        /* axes that are looked at in all frames */
 #define NEARLY 1.25     /* times the best one's distance: the simplest of them is the remedy */
 #define SLIGHT_TURN 1.5 /* degrees */
 #define SLIGHT_SHIFT 0.004 /* m */
 #define SLIGHT_SCALE 0.02
+#define UNIT 1.8        /* times: people differ less */
 #define LARGE_TURN 15.0 /* degrees: as many are the joints off */
 #define LARGE_SHIFT 0.1 /* m */
 #define LYING 55.0      /* degrees from upright throughout */
@@ -25,7 +27,7 @@
 typedef struct trial {
     mhi_pose pose;
     double rms;
-    int32_t cost; /* how much it takes to write it down */
+    int32_t cost; /* how much it takes to write it down; right angles less than any number */
 } trial;
 
 /* The 24 turns by right angles, and those mirrored: number 0 is no turn. */
@@ -117,15 +119,33 @@ static void consider(trial *best, const mhi_pose *pose, double rms, int32_t cost
     }
 }
 
+/* From the nearest postures, and from the default one: far away the nearest ones are all at the
+ * ends of their ranges. *as_is: the distance before. */
+static double adjust_from_both(mhi_pose_search *s, int32_t freedom, mhi_pose *pose, double *as_is) {
+    mhi_pose rested = *pose;
+    *as_is = mhi_pose_fit(s, pose, 1);
+    const double rms = mhi_pose_adjust(s, freedom, ROUNDS, pose);
+    const double other =
+        mhi_pose_rest(s) == MHE_OK ? mhi_pose_adjust(s, freedom, ROUNDS, &rested) : NAN;
+    if (!(rms <= other)) {
+        *pose = isnan(other) ? *pose : rested;
+        return isnan(other) ? rms : other;
+    }
+    return rms;
+}
+
 /* A turn, shift or scale that is near to none. */
 static void try_near(mhi_pose_search *s, trial *best) {
     static const struct {
         int32_t freedom, cost;
-    } ways[] = {{MHI_POSE_SHIFT, 2}, {MHI_POSE_TURN, 2}, {MHI_POSE_TURN | MHI_POSE_SHIFT, 4}};
+    } ways[] = {{MHI_POSE_SHIFT, 3},
+                {MHI_POSE_SCALE, 3},
+                {MHI_POSE_TURN, 4},
+                {MHI_POSE_TURN | MHI_POSE_SHIFT, 6}};
     for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
         mhi_pose pose = mhi_pose_identity();
-        (void)mhi_pose_fit(s, &pose, 1);
-        const double rms = mhi_pose_adjust(s, ways[i].freedom, ROUNDS, &pose);
+        double as_is;
+        const double rms = adjust_from_both(s, ways[i].freedom, &pose, &as_is);
         consider(best, &pose, rms, ways[i].cost);
     }
 }
@@ -138,7 +158,7 @@ static int32_t choose_axes(mhi_pose_search *s, int32_t chosen[LIKELY]) {
     for (int32_t i = 0; i < 48; i++) {
         mhi_pose pose = right_angles(i % 24, i / 24);
         const double as_is = mhi_pose_fit(s, &pose, 1);
-        distance[i] = fmin(as_is, mhi_pose_adjust(s, MHI_POSE_SHIFT, 6, &pose));
+        distance[i] = fmin(as_is, mhi_pose_adjust(s, MHI_POSE_SHIFT, GLANCE, &pose));
     }
     mhi_pose_look(s, 0);
     for (; n < LIKELY; n++) {
@@ -166,21 +186,33 @@ static void try_axes(mhi_pose_search *s, trial *best) {
         const double degrees = axis_of(&pose, axis);
         const int about_x = fabs(axis[0]) > 0.99 && degrees < 100;
         const int32_t cost = 1 + 4 * mirrored + (about_x || degrees < 1 ? 0 : 1);
-        double rms = mhi_pose_fit(s, &pose, 1);
-        consider(best, &pose, rms, cost);
-        rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, 6, &pose);
-        consider(best, &pose, rms, cost + 2);
-        if (rms < 2 * best->rms) {
-            rms = mhi_pose_adjust(s, MHI_POSE_SHIFT, ROUNDS, &pose);
-            consider(best, &pose, rms, cost + 2);
-        }
+        const mhi_pose unshifted = pose;
+        double as_is;
+        const double rms = adjust_from_both(s, MHI_POSE_SHIFT, &pose, &as_is);
+        consider(best, &unshifted, as_is, cost);
+        consider(best, &pose, rms, cost + 3);
     }
     mhi_pose pose = best->pose;
     (void)mhi_pose_fit(s, &pose, 1);
     double rms = mhi_pose_adjust(s, MHI_POSE_TURN | MHI_POSE_SHIFT, ROUNDS, &pose);
-    consider(best, &pose, rms, 6);
+    consider(best, &pose, rms, 7);
     rms = mhi_pose_adjust(s, MHI_POSE_TURN | MHI_POSE_SHIFT | MHI_POSE_SCALE, ROUNDS, &pose);
-    consider(best, &pose, rms, 8);
+    consider(best, &pose, rms, 9);
+}
+
+/* Another unit is a matter of the recording, another size mostly one of the model. */
+static void tell_scale(const char *path, double scale, double as_is, double rms, int32_t weight,
+                       mhi_findings *findings) {
+    const int unit = scale > UNIT || scale < 1 / UNIT;
+    mhi_findings_add(
+        findings, weight, "",
+        "%s: the markers are those of a body %.4g times as large as the model: %.1f mm "
+        "from the nearest posture (RMS), %.1f mm if they are scaled (%s)",
+        path, 1 / scale, 1e3 * as_is, 1e3 * rms,
+        unit ? "another unit?" : "the model of another person?");
+    mhi_findings_advise(findings, "%sdata.transform: {scale: %.4g}",
+                        unit ? "" : "scale the model (mhe-model scale), or where it is right ",
+                        scale);
 }
 
 static void tell_transform(const char *path, const trial *best, double as_is,
@@ -199,7 +231,11 @@ static void tell_transform(const char *path, const trial *best, double as_is,
                          "%s: the markers are those of a mirrored body: %.1f mm from the nearest "
                          "posture (RMS), %.1f mm if they are mirrored back",
                          path, 1e3 * as_is, 1e3 * best->rms);
-    } else if (degrees < SLIGHT_TURN && fabs(best->pose.scale - 1) < SLIGHT_SCALE) {
+    } else if (degrees < SLIGHT_TURN && fabs(best->pose.scale - 1) > SLIGHT_SCALE) {
+        tell_scale(path, best->pose.scale, as_is, best->rms, weight, findings);
+        mhi_text_free(&how);
+        return;
+    } else if (degrees < SLIGHT_TURN) {
         mhi_findings_add(findings, weight, "",
                          "%s: all markers are off by the same %.3f %.3f %.3f m: %.1f mm from the "
                          "nearest posture (RMS), %.1f mm without (another origin?)",
@@ -258,7 +294,11 @@ mhe_status mhi_believe_fit(const mhi_run *run, const mhi_system *system, const m
     const mhi_pose identity = mhi_pose_identity();
     const double as_is = mhi_pose_fit(s, &identity, 1);
     trial best = {identity, as_is, 0};
-    if (!isnan(as_is)) {
+    if (mhi_pose_spent(s)) { /* the distance is not that of the nearest postures */
+        mhi_findings_add(findings, MHI_FINDING_NOTE, "",
+                         "%s: too many markers or coordinates to search for a common turn or shift",
+                         path);
+    } else if (!isnan(as_is)) {
         try_near(s, &best);
         if (as_is > FAR) {
             try_axes(s, &best);

@@ -8,12 +8,14 @@
 #include <string.h>
 
 #define FRAMES 10        /* of the recording that are looked at */
+#define FOUND 1e-5       /* rad or m: a posture that moves less is found */
 #define FITS_BETTER 0.75 /* of the RMS distance that must not remain */
 
 typedef struct search {
     const mhi_recording *recording;
     mhi_system_context *context;
     mhi_start *start;
+    mhi_work work; /* all pairs of many markers could take minutes */
     int32_t n_k;
     int32_t *column; /* [n_k] whose measurements stand for a marker */
     double *q, *markers;
@@ -30,9 +32,15 @@ static int search_open(search *s, const mhi_system *system, const mhi_recording 
     for (int32_t i = 0; i < s->n_k && s->column != NULL; i++) {
         s->column[i] = i;
     }
-    return s->column != NULL && s->q != NULL && s->markers != NULL &&
-           mhi_system_context_create(system, &s->context, NULL) == MHE_OK &&
-           mhi_start_create(system, s->context, &s->start, NULL) == MHE_OK;
+    if (s->column == NULL || s->q == NULL || s->markers == NULL ||
+        mhi_system_context_create(system, &s->context, NULL) != MHE_OK ||
+        mhi_start_create(system, s->context, &s->start, NULL) != MHE_OK) {
+        return 0;
+    }
+    mhi_start_set_enough(s->start, FOUND);
+    mhi_work_begin(&s->work, mhi_start_affordable(s->start), 0);
+    mhi_system_context_set_work(s->context, &s->work);
+    return 1;
 }
 
 static void search_close(search *s) {
@@ -81,7 +89,7 @@ int32_t mhi_exchange_find(const mhi_system *system, const mhi_recording *recordi
     for (double now = fit(&s); n < most; now = out[n++].fixed) {
         mhi_exchange best = {.as_is = now, .fixed = INFINITY};
         for (int32_t a = 0; a < s.n_k; a++) {
-            for (int32_t b = a + 1; b < s.n_k; b++) {
+            for (int32_t b = a + 1; b < s.n_k && !mhi_work_spent(&s.work); b++) {
                 if (!suspect[a] && !suspect[b]) {
                     continue;
                 }

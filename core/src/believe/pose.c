@@ -1,30 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* pose.c: inverse kinematics and the best common transform by turns: with the postures held, turn,
- * shift and scale are those of Kabsch (Acta Cryst. A 34, 1978, doi:10.1107/S0567739478001680) and
- * Umeyama (IEEE PAMI 13, 1991, doi:10.1109/34.88573). */
-#include "believe/pose.h"
-
-#include "base/arena.h"
+/* pose.c: inverse kinematics in a dozen frames, and the best common transform for given postures:
+ * turn, shift and scale are those of Kabsch (Acta Cryst. A 34, 1978,
+ * doi:10.1107/S0567739478001680) and Umeyama (IEEE PAMI 13, 1991, doi:10.1109/34.88573). */
 #include "base/pi.h"
-#include "estimator/start.h"
+#include "believe/pose_private.h"
 
 #include <math.h>
 #include <string.h>
 
 #define FRAMES 12
-#define FEW 3    /* for a first look */
-#define ENOUGH 2 /* markers of a frame */
-
-struct mhi_pose_search {
-    const mhe_description *description;
-    mhi_system_context *context;
-    mhi_start *start;
-    int32_t n_frames, n_q, n_k;
-    int32_t every;                /* frame is looked at */
-    double *raw, *turned, *model; /* [frames x 3 n_k] */
-    double *q, *rest;             /* [frames x n_q], [n_q] */
-    mhi_arena arena;
-};
+#define FEW 3        /* for a first look */
+#define ENOUGH 2     /* markers of a frame */
+#define FOUND 1e-5   /* rad or m: a posture that moves less is found ... */
+#define ROUGHLY 1e-3 /* ... in a first look */
+#define TRIES 12     /* postures a search begins from ... */
+#define FEW_TRIES 3  /* ... in a first look */
 
 static int32_t count_seen(const double *row, int32_t n_k) {
     int32_t n = 0;
@@ -75,16 +65,25 @@ mhe_status mhi_pose_open(const mhi_system *system, const mhi_recording *r, mhi_p
     s->turned = MHI_TAKE(&arena, double, FRAMES * 3 * s->n_k);
     s->model = MHI_TAKE(&arena, double, FRAMES * 3 * s->n_k);
     s->q = MHI_TAKE(&arena, double, FRAMES * s->n_q);
+    s->trial = MHI_TAKE(&arena, double, FRAMES * s->n_q);
     s->rest = MHI_TAKE(&arena, double, s->n_q);
+    s->marker_q = MHI_TAKE(&arena, double, 3 * s->n_k * s->n_q);
+    s->factor = MHI_TAKE(&arena, double, FRAMES * s->n_q * s->n_q);
+    s->solved = MHI_TAKE(&arena, double, FRAMES * s->n_q * (MHI_POSE_FREEDOMS + 1));
+    s->coupling = MHI_TAKE(&arena, double, s->n_q *(MHI_POSE_FREEDOMS + 1));
     s->arena = arena;
-    mhe_status status =
-        s->raw == NULL || s->turned == NULL || s->model == NULL || s->q == NULL || s->rest == NULL
-            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-            : mhi_system_context_create(system, &s->context, err);
+    mhe_status status = s->raw == NULL || s->turned == NULL || s->model == NULL || s->q == NULL ||
+                                s->trial == NULL || s->rest == NULL || s->marker_q == NULL ||
+                                s->factor == NULL || s->solved == NULL || s->coupling == NULL
+                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                            : mhi_system_context_create(system, &s->context, err);
     if (status == MHE_OK) {
         status = mhi_start_create(system, s->context, &s->start, err);
     }
     if (status == MHE_OK) {
+        mhi_work_begin(&s->work, mhi_start_affordable(s->start), 0);
+        mhi_system_context_set_work(s->context, &s->work);
+        mhi_start_set_enough(s->start, FOUND);
         for (int32_t i = 0; i < s->n_q; i++) {
             const mhe_coordinate *c = &d->coordinates[i];
             s->rest[i] = fmin(fmax(c->value, c->lower), c->upper);
@@ -101,6 +100,22 @@ mhe_status mhi_pose_open(const mhi_system *system, const mhi_recording *r, mhi_p
 
 void mhi_pose_look(mhi_pose_search *s, int32_t few) {
     s->every = few ? (s->n_frames + FEW - 1) / FEW : 1;
+    mhi_start_set_enough(s->start, few ? ROUGHLY : FOUND);
+    mhi_start_set_tries(s->start, few ? FEW_TRIES : TRIES);
+}
+
+int32_t mhi_pose_spent(const mhi_pose_search *s) {
+    return mhi_work_spent(&s->work);
+}
+
+mhe_status mhi_pose_rest(mhi_pose_search *s) {
+    mhe_status status = MHE_OK;
+    for (int32_t f = 0; f < s->n_frames && status == MHE_OK; f += s->every) {
+        memcpy(s->q + (ptrdiff_t)f * s->n_q, s->rest, sizeof(double) * (size_t)s->n_q);
+        status = mhi_system_markers(s->context, s->rest, s->model + (ptrdiff_t)f * 3 * s->n_k, NULL,
+                                    NULL);
+    }
+    return status;
 }
 
 void mhi_pose_close(mhi_pose_search *s) {
@@ -116,7 +131,7 @@ mhi_pose mhi_pose_identity(void) {
     return (mhi_pose){.turn = {1, 0, 0, 0, 1, 0, 0, 0, 1}, .scale = 1};
 }
 
-static void apply(const mhi_pose *pose, const double in[3], double out[3]) {
+void mhi_pose_place(const mhi_pose *pose, const double in[3], double out[3]) {
     for (int32_t i = 0; i < 3; i++) {
         const double *row = &pose->turn[3 * i];
         out[i] = pose->scale * (row[0] * in[0] + row[1] * in[1] + row[2] * in[2]) + pose->shift[i];
@@ -130,7 +145,7 @@ double mhi_pose_fit(mhi_pose_search *s, const mhi_pose *pose, int32_t anywhere) 
         const ptrdiff_t at = (ptrdiff_t)f * 3 * s->n_k;
         double *q = s->q + (ptrdiff_t)f * s->n_q, rms = NAN;
         for (int32_t i = 0; i < s->n_k; i++) {
-            apply(pose, s->raw + at + 3 * i, s->turned + at + 3 * i);
+            mhi_pose_place(pose, s->raw + at + 3 * i, s->turned + at + 3 * i);
         }
         if (anywhere) {
             memcpy(q, f == 0 ? s->rest : q - (ptrdiff_t)s->every * s->n_q,
@@ -246,8 +261,7 @@ static int32_t counts(const mhi_pose_search *s, int32_t i) {
     return i / s->n_k % s->every == 0 && !isnan(s->raw[3 * i]);
 }
 
-/* The best transform of the frames' raw markers to where the model has them. */
-static void procrustes(const mhi_pose_search *s, int32_t freedom, mhi_pose *pose) {
+void mhi_pose_superpose(const mhi_pose_search *s, int32_t freedom, mhi_pose *pose) {
     const int32_t n = s->n_frames * s->n_k;
     double from[3] = {0}, to[3] = {0}, h[9] = {0}, spread = 0, along = 0;
     int32_t seen = 0;
@@ -290,24 +304,6 @@ static void procrustes(const mhi_pose_search *s, int32_t freedom, mhi_pose *pose
     }
 }
 
-double mhi_pose_adjust(mhi_pose_search *s, int32_t freedom, int32_t rounds, mhi_pose *pose) {
-    double rms = mhi_pose_fit(s, pose, 0);
-    for (int32_t i = 0; i < rounds && !isnan(rms); i++) {
-        const double before = rms;
-        mhi_pose next = *pose;
-        procrustes(s, freedom, &next);
-        rms = mhi_pose_fit(s, &next, 0);
-        if (!(rms <= before)) {
-            return mhi_pose_fit(s, pose, 0);
-        }
-        *pose = next;
-        if (before - rms < 1e-6) {
-            break;
-        }
-    }
-    return rms;
-}
-
 const double *mhi_pose_postures(const mhi_pose_search *s, int32_t *n_frames) {
     *n_frames = s->n_frames;
     return s->q;
@@ -333,13 +329,13 @@ double mhi_pose_tilt(mhi_pose_search *s, const mhi_pose *pose) {
         one.model = s->turned;
         for (int32_t i = 0; i < s->n_k; i++) {
             double moved[3];
-            apply(pose, s->turned + 3 * i, moved);
+            mhi_pose_place(pose, s->turned + 3 * i, moved);
             memcpy(s->turned + 3 * i, moved, sizeof moved);
             for (int32_t k = 0; k < 3; k++) { /* what was not seen counts on neither side */
                 one.raw[3 * i + k] = isnan(moved[k]) ? NAN : one.raw[3 * i + k];
             }
         }
-        procrustes(&one, MHI_POSE_TURN | MHI_POSE_SHIFT, &body);
+        mhi_pose_superpose(&one, MHI_POSE_TURN | MHI_POSE_SHIFT, &body);
         double along = 0;
         for (int32_t i = 0; i < 9; i++) {
             along += g[i / 3] * body.turn[i] * g[i % 3] / (size * size);

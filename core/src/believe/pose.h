@@ -26,13 +26,17 @@ void mhi_pose_close(mhi_pose_search *search);
 
 /* 1: few frames are looked at from here on, for a first choice; 0: all. */
 void mhi_pose_look(mhi_pose_search *search, int32_t few);
+/* 1: the work that a search may take is used up; what is found from here on is an upper bound. */
+int32_t mhi_pose_spent(const mhi_pose_search *search);
 
 mhi_pose mhi_pose_identity(void);
 /* RMS distance of the transformed markers from the nearest postures, m. `anywhere`: these are
  * looked for from all over the ranges, else from the postures before. NaN: not known. */
 double mhi_pose_fit(mhi_pose_search *search, const mhi_pose *pose, int32_t anywhere);
-/* Adjusts what `freedom` (MHI_POSE_*) names, by turns with the postures; returns the RMS distance
- * that remains. */
+/* All postures are the default one, for mhi_pose_adjust to begin from. */
+mhe_status mhi_pose_rest(mhi_pose_search *search);
+/* Adjusts what `freedom` (MHI_POSE_*) names together with the postures, from those of the last fit
+ * or rest, in at most `rounds` steps; returns the RMS distance that remains. */
 double mhi_pose_adjust(mhi_pose_search *search, int32_t freedom, int32_t rounds, mhi_pose *pose);
 
 /* Postures of the last fit [frames x n_q] and their number. */

@@ -9,14 +9,17 @@
 #include <string.h>
 
 #define MAX_ITERATIONS 60
-#define N_POSTURES 12 /* of the search */
-#define BETTER 0.99   /* of the distance: as near is not worth a posture elsewhere */
+#define N_POSTURES 12       /* of the search, at first */
+#define EVALUATIONS 2e5     /* of markers: most that a search may take ... */
+#define MULTIPLICATIONS 1e9 /* ... in all, so that large models may take fewer */
+#define BETTER 0.99         /* of the distance: as near is not worth a posture elsewhere */
 
 struct mhi_start {
     const mhe_description *description;
     mhi_system_context *context;
     const mhi_tasks *tasks; /* NULL: none */
     int32_t n_q, n_k;
+    int32_t tries;
     double enough;             /* rad or m: a step shorter than this ends the search */
     double *marker, *marker_q; /* [3 n_k], [3 n_k x n_q] */
     double *normal, *step;     /* [n_q x n_q], [n_q] */
@@ -39,6 +42,7 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
     s->n_q = d->n_coordinates;
     s->n_k = d->n_markers;
     s->enough = 1e-9;
+    s->tries = N_POSTURES;
     s->marker = MHI_TAKE(&arena, double, 3 * s->n_k);
     s->marker_q = MHI_TAKE(&arena, double, 3 * s->n_k * s->n_q);
     s->normal = MHI_TAKE(&arena, double, s->n_q * s->n_q);
@@ -63,6 +67,17 @@ void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks) {
 
 void mhi_start_set_enough(mhi_start *start, double step) {
     start->enough = step;
+}
+
+void mhi_start_set_tries(mhi_start *start, int32_t tries) {
+    start->tries = tries;
+}
+
+int64_t mhi_start_affordable(const mhi_start *s) {
+    const double n_q = s->n_q, rows = 3.0 * s->n_k;
+    /* an evaluation, and its share of a step: normal equations and their factor */
+    const double one = 100 + rows * (20 + n_q) + n_q * n_q * n_q / 6;
+    return (int64_t)fmin(EVALUATIONS, MULTIPLICATIONS / one) + 1;
 }
 
 void mhi_start_free(mhi_start *start) {
@@ -211,7 +226,7 @@ mhe_status mhi_start_search(mhi_start *s, const double *measured, double *q, dou
     mhe_status status = mhi_start_posture(s, measured, s->best, rms, err);
     double best = *rms;
     for (int32_t p = 0;
-         p < N_POSTURES && status == MHE_OK && best > 0.01 && !mhi_system_context_spent(s->context);
+         p < s->tries && status == MHE_OK && best > 0.01 && !mhi_system_context_spent(s->context);
          p++) {
         for (int32_t i = 0; i < s->n_q; i++) {
             const mhe_coordinate *c = &s->description->coordinates[i];

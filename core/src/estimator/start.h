@@ -14,6 +14,11 @@ mhe_status mhi_start_create(const mhi_system *system, mhi_system_context *contex
 void mhi_start_set_tasks(mhi_start *start, const mhi_tasks *tasks);
 /* The step, rad or m, below which a posture is taken as found; at first 1e-9. */
 void mhi_start_set_enough(mhi_start *start, double step);
+/* From how many postures spread over the ranges mhi_start_search begins; at first 12. */
+void mhi_start_set_tries(mhi_start *start, int32_t tries);
+/* The account of a search that nobody waits for long: half a second or so on any model, counted
+ * and not timed, so that it ends alike everywhere. For mhi_work_begin. */
+int64_t mhi_start_affordable(const mhi_start *start);
 void mhi_start_free(mhi_start *start);
 
 /* Least-squares posture q [n_q] within the coordinate ranges for markers [n_k x 3] (NaN: missing),
