@@ -40,7 +40,7 @@ typedef struct recording {
     double offset; /* of the packet in work: stamps + offset is CLOCK_MONOTONIC; NaN: not known */
     double first;  /* s, earliest stamp */
     double begun;  /* s of CLOCK_MONOTONIC at which `first` is due */
-    int32_t started, ended;
+    int32_t started, ended, again;
 } recording;
 
 static double now(void) {
@@ -296,7 +296,11 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
             for (int32_t k = 0; k < s->n_tracks; k++) {
                 s->tracks[k].next = 0;
             }
-            taker->event(taker->data, MHE_SOURCE_WARNING, -1, "the recording begins again");
+            if (!s->again) { /* told once */
+                taker->event(taker->data, MHE_SOURCE_WARNING, -1,
+                             "the recording begins again, as often as it ends (loop)");
+            }
+            s->again = 1;
             s->begun = now();
             continue;
         }
@@ -319,7 +323,7 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
         const mhe_chunk chunk = {.size = sizeof chunk,
                                  .stream = t->slot,
                                  .n = n,
-                                 .received = now(),
+                                 .received = speed > 0 ? now() : stamp,
                                  .stamp = t->stream->stamp + t->next,
                                  .values =
                                      t->stream->values + t->next * t->stream->about.n_channels};

@@ -139,6 +139,7 @@ static void receive(receiver *r, double seconds, int32_t enough) {
     "    tracked: [Deltoid1, Deltoid2, Deltoid3, InfraSpin, TricepsLong, TricepsLat,\n"    \
     "      TricepsMed, BicepsLong, BicepsShort, BRA, BRD]\n"                               \
     "solver: {plugin: mhe.solver.rti, preset: speed}\n"                                    \
+    "realtime: {most_behind: 0}\n"                                                         \
     "sinks:\n"                                                                             \
     "  - {plugin: mhe.sink.files, digits: 17, signals: [q, force, emg]}\n"                 \
     "  - {plugin: mhe.sink.lsl, name: %s-out, signals: [q, force]}\n"                      \

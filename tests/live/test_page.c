@@ -23,6 +23,7 @@
     "integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03}\n"           \
     "costs: [{plugin: mhe.cost.emg-markers-high, tracked: [Deltoid2, BicepsLong, BicepsShort]}]\n" \
     "solver: {plugin: mhe.solver.rti, preset: speed}\n"                                            \
+    "realtime: {most_behind: 0}\n"                                                                 \
     "sinks:\n"                                                                                     \
     "  - {plugin: mhe.sink.files, digits: 17, signals: [q, force]}\n"                              \
     "  - {plugin: mhe.sink.web, port: %d}\n"                                                       \

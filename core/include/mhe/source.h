@@ -43,9 +43,11 @@ typedef struct mhe_stream_info {
 /* The work that a frame was granted, in a recording of ours: what a replay obeys, so that it looks
  * at no clock. */
 #define MHE_GRANT_LOOKS 8
+#define MHE_GRANT_PASSED_OVER 2
 typedef struct mhe_grant {
     int64_t arrival;  /* number of the packet that the frame's sample came in */
-    int32_t prepared; /* 1: its window was prepared ahead of it */
+    int32_t prepared; /* 1: its window was prepared ahead of it; MHE_GRANT_PASSED_OVER: it was not
+                       * taken at all, since the run was behind */
     int32_t by_clock; /* 1: it had a deadline */
     int32_t
         refused; /* looks at the clock before an evaluation was broken off by it; -1: none was */
@@ -56,9 +58,10 @@ typedef struct mhe_grant {
 /* Samples of one stream; lent for the call. */
 typedef struct mhe_chunk {
     uint32_t size;
-    int32_t stream;       /* 0 .. count - 1 */
-    int32_t n;            /* samples */
-    double received;      /* s of CLOCK_MONOTONIC at which they were there */
+    int32_t stream;  /* 0 .. count - 1 */
+    int32_t n;       /* samples */
+    double received; /* s of CLOCK_MONOTONIC at which they were there; of a recording as fast as it
+                      * goes any other time: frames of it wait as long as they must */
     const double *stamp;  /* [n], s of the sender's clock; NULL: it has none */
     const double *values; /* [n x n_channels], NaN: missing */
     int32_t n_grants;     /* frames that were estimated of these samples when they were recorded */

@@ -36,6 +36,7 @@ typedef struct mhi_model_section {
     int32_t unsupported;    /* MHI_UNSUPPORTED_* */
     mhe_text_list locked;   /* coordinates that stay at the file's value */
     mhe_text_map locked_at; /* coordinates that stay at this value, rad or m */
+    const char *motion;     /* .sto .mot: a motion like the one to come */
 } mhi_model_section;
 
 /* The key of data.marker_weights that names a file; one text alone is its value. */
@@ -134,6 +135,9 @@ typedef struct mhi_bounds_section {
 typedef struct mhi_realtime_section {
     double deadline_ms; /* 0: none */
     int32_t threads;
+    int32_t priority;    /* SCHED_FIFO of a live run's solver; 0: none */
+    int32_t lock_memory; /* of a live run */
+    double most_behind;  /* s that a frame of a live run may wait; 0: for ever */
 } mhi_realtime_section;
 
 typedef struct mhi_output_section {

@@ -34,6 +34,9 @@ static const mhe_option model_options[] = {
                   "the estimate."),
     MHE_OPT_MAP(mhi_use_section, locked_at, 0,
                 "Coordinates that stay at a value of their own, {NAME: rad or m}."),
+    MHE_OPT_PATH(mhi_use_section, motion, 0,
+                 "Joint angles of a motion like the one to come (.sto, .mot; an earlier estimate): "
+                 "fitted paths are fitted to its range, with a margin. data.angles unless given."),
 };
 
 static const mhe_option muscle_options[] = {
@@ -209,6 +212,16 @@ static const mhe_option realtime_options[] = {
                  "with mhe-run --realtime three quarters of the time between frames."),
     MHE_OPT_INT(mhi_realtime_section, threads, 1, 1, 256, "1",
                 "Threads that evaluate a window's intervals, where the solver can use them."),
+    MHE_OPT_INT(
+        mhi_realtime_section, priority, 0, 0, 99, "1",
+        "With mhe-live: real-time priority (SCHED_FIFO) of the thread that makes estimates; "
+        "taken only where the machine has a second core, so that no sender starves; 0: "
+        "none."),
+    MHE_OPT_BOOL(mhi_realtime_section, lock_memory, 0,
+                 "With mhe-live: keep the program's memory from being moved out (mlockall)."),
+    MHE_OPT_REAL(mhi_realtime_section, most_behind, 0.5, 0, 1e6, "s",
+                 "With mhe-live: a frame that has waited longer is passed over, so that on a "
+                 "machine that does not keep up estimates stay of now; 0: none is, however late."),
 };
 
 static const mhe_option output_options[] = {

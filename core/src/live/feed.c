@@ -159,7 +159,7 @@ void mhi_feed_prepare(mhi_feed *f) {
 static void obey(mhi_feed *f, const mhe_grant *grant) {
     f->repeats |= grant != NULL;
     mhi_estimator_grant(f->estimator, grant);
-    if (grant != NULL && grant->prepared) {
+    if (grant != NULL && grant->prepared == 1) {
         (void)mhe_estimator_prepare(f->estimator, NULL);
     }
 }
@@ -174,8 +174,29 @@ static void tell_granted(mhi_feed *f, double time) {
     }
 }
 
+/* A frame that has waited too long, or that was passed over when it was recorded. */
+static int32_t pass_over(mhi_feed *f, double time, const mhe_grant *grant) {
+    const mhe_grant passed = {.prepared = MHE_GRANT_PASSED_OVER};
+    if (grant != NULL ? grant->prepared != MHE_GRANT_PASSED_OVER : !f->behind || f->repeats) {
+        return 0;
+    }
+    f->repeats |= grant != NULL;
+    f->n_frames++;
+    if (f->n_passed_over++ == 0) {
+        warn(f, "the machine does not keep up: frames that have waited for longer than "
+                "realtime.most_behind are passed over");
+    }
+    if (f->pusher != NULL) {
+        f->pusher(f->data, &passed, f->start + time);
+    }
+    return 1;
+}
+
 static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_grant *grant,
                              mhe_error *err) {
+    if (pass_over(f, time, grant)) {
+        return MHE_OK;
+    }
     mhe_estimate estimate = {.size = sizeof estimate};
     mhe_error why = {0};
     int32_t ready = 0;

@@ -36,8 +36,9 @@ typedef struct mhi_feed {
     int32_t n_waiting, first_waiting;
     int32_t repeats;         /* what comes is a recording that says what frames were granted */
     int32_t prepared;        /* since the last frame */
+    int32_t behind;          /* frames are passed over: the run does not keep up */
     const double **channels; /* [info.n_channels] of a frame */
-    int64_t n_frames, n_estimates, n_out_of_order, n_restarts;
+    int64_t n_frames, n_estimates, n_out_of_order, n_restarts, n_passed_over;
     int64_t n_by_status[8];
 } mhi_feed;
 

@@ -32,6 +32,7 @@ struct mhi_packet {
     int32_t event;  /* MHE_SOURCE_* */
     int32_t n;      /* samples */
     int32_t n_channels;
+    double put;        /* s of CLOCK_MONOTONIC, when it came into the queue */
     double received;   /* s of CLOCK_MONOTONIC */
     double offset;     /* s to add to stamps; NaN: not known */
     double *stamp;     /* [n]; NULL: the sender has no clock */
@@ -48,7 +49,10 @@ mhi_packet *mhi_packet_event(int32_t source, int32_t event, int32_t stream, cons
 
 /* The queue that all intakes of a run share. */
 typedef struct mhi_mailbox mhi_mailbox;
-mhi_mailbox *mhi_mailbox_create(void); /* NULL: no memory */
+/* `inherits`: whoever holds it goes as first as whoever waits for it; for a thread of real-time
+ * priority alone, since such a lock is handed on in turn, which on a busy machine takes ordinary
+ * threads a time slice each. NULL: no memory. */
+mhi_mailbox *mhi_mailbox_create(int32_t inherits);
 void mhi_mailbox_free(mhi_mailbox *box);
 void mhi_mailbox_put(mhi_mailbox *box, mhi_packet *packet); /* takes it over; NULL is fine. [any] */
 /* The oldest packet, which becomes the caller's; waits for one until `deadline` (s of

@@ -40,7 +40,7 @@ static mhe_status start_sources(mhe_live *l, mhe_error *err) {
                         l->run->path);
     }
     l->intakes = calloc((size_t)list->n, sizeof(mhi_intake *));
-    l->box = mhi_mailbox_create();
+    l->box = mhi_mailbox_create(l->run->realtime.priority > 0);
     if (l->intakes == NULL || l->box == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
@@ -115,7 +115,7 @@ mhe_status mhe_live_open(mhe_config *config, const mhe_live_setup *setup, mhe_li
     l->folder = setup->folder == NULL ? "." : setup->folder;
     l->wait = setup->wait;
     l->mvc_channel = -1;
-    (void)pthread_mutex_init(&l->mutex, NULL);
+    mhi_priority_mutex(&l->mutex, l->run->realtime.priority > 0);
     mhe_status status = open_estimator(l, err);
     if (status == MHE_OK) {
         mhi_live_set_control(l);
@@ -214,6 +214,14 @@ static void record_packet(mhe_live *l, const mhi_packet *p) {
 
 /* ---- the loop ---- */
 
+/* Samples that waited too long in the queue. A source that keeps to no clock (a recording as fast
+ * as it goes) says so by another time of receipt: it waits as long as it must. */
+static int32_t is_behind(const mhe_live *l, const mhi_packet *p) {
+    const double most = l->run->realtime.most_behind;
+    return most > 0 && p->kind == MHI_PACKET_SAMPLES && fabs(p->put - p->received) < 1 &&
+           mhi_seconds() - p->put > most;
+}
+
 mhe_status mhi_live_take(mhe_live *l, mhi_packet *p, mhe_error *err) {
     if (p->kind == MHI_PACKET_STREAM && mhi_live_name(l, p, err) != MHE_OK) {
         mhi_packet_free(p);
@@ -222,6 +230,7 @@ mhe_status mhi_live_take(mhe_live *l, mhi_packet *p, mhe_error *err) {
     if (l->feed.running || p->kind == MHI_PACKET_STREAM) {
         record_packet(l, p);
     }
+    l->feed.behind = is_behind(l, p);
     const mhe_status status = mhi_feed_take(&l->feed, p, err);
     if (p->kind == MHI_PACKET_STREAM) {
         keep_stream(l, p);
@@ -296,14 +305,8 @@ static mhe_status wait_for_streams(mhe_live *l, mhe_error *err) {
     return status;
 }
 
-mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
-    if (l == NULL) {
-        return mhe_fail(err, MHE_E_ARGUMENT, "there is no live run");
-    }
-    mhe_status status = wait_for_streams(l, err);
-    if (status == MHE_OK && !stopped(l)) {
-        status = mhi_live_begin(l, err);
-    }
+static mhe_status loop(mhe_live *l, double seconds, mhe_error *err) {
+    mhe_status status = MHE_OK;
     double state_told = 0;
     int32_t ended = 0;
     while (status == MHE_OK && !stopped(l)) {
@@ -331,6 +334,22 @@ mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
             break;
         }
     }
+    return status;
+}
+
+mhe_status mhe_live_run(mhe_live *l, double seconds, mhe_error *err) {
+    if (l == NULL) {
+        return mhe_fail(err, MHE_E_ARGUMENT, "there is no live run");
+    }
+    mhe_status status = wait_for_streams(l, err);
+    if (status == MHE_OK && !stopped(l)) {
+        status = mhi_live_begin(l, err);
+    }
+    mhi_priority_take(l->run, l->host, &l->priority);
+    if (status == MHE_OK) {
+        status = loop(l, seconds, err);
+    }
+    mhi_priority_give_back(&l->priority);
     status = status == MHE_E_INTERRUPTED ? MHE_OK : status;
     if (l->record != NULL) {
         mhi_live_end_record(l, NULL);

@@ -6,6 +6,7 @@
 #include "library/config.h"
 #include "live/feed.h"
 #include "live/outlets.h"
+#include "live/priority.h"
 #include "live/taping.h"
 
 #include <mhe/live.h>
@@ -53,7 +54,8 @@ struct mhe_live {
     double mvc[MHI_LIVE_MVC]; /* maxima found; 0: not yet */
     char mvc_file[512];
     int32_t n_edits;
-    mhi_live_edit *edits; /* [MHI_LIVE_EDITS] */
+    mhi_live_edit *edits;  /* [MHI_LIVE_EDITS] */
+    mhi_priority priority; /* of the thread of run */
     atomic_int stop;
     pthread_mutex_t mutex; /* of what follows: sinks' threads */
     int32_t n_requests;

@@ -2,6 +2,9 @@
 /* mailbox.c: packets and the queue between sources and the estimator's thread. */
 #include "live/intake.h"
 
+#include "base/clock.h"
+#include "live/priority.h"
+
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
@@ -134,11 +137,11 @@ mhi_packet *mhi_packet_event(int32_t source, int32_t event, int32_t stream, cons
     return p;
 }
 
-mhi_mailbox *mhi_mailbox_create(void) {
+mhi_mailbox *mhi_mailbox_create(int32_t inherits) {
     mhi_mailbox *box = calloc(1, sizeof *box);
     pthread_condattr_t attributes;
     if (box != NULL) {
-        (void)pthread_mutex_init(&box->mutex, NULL);
+        mhi_priority_mutex(&box->mutex, inherits);
         (void)pthread_condattr_init(&attributes);
         (void)pthread_condattr_setclock(&attributes, CLOCK_MONOTONIC);
         (void)pthread_cond_init(&box->filled, &attributes);
@@ -165,6 +168,7 @@ void mhi_mailbox_put(mhi_mailbox *box, mhi_packet *packet) {
     if (packet == NULL) {
         return;
     }
+    packet->put = mhi_seconds();
     (void)pthread_mutex_lock(&box->mutex);
     packet->next = NULL;
     *(box->first == NULL ? &box->first : &box->last->next) = packet;

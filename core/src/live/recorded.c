@@ -176,7 +176,11 @@ static mhe_status take_grants(owned *o, mhe_error *err) {
                             o->xdf->path, (long long)k);
         }
         last = (int64_t)row[0];
-        *g = (mhe_grant){last, row[1] != 0, row[2] != 0, whole(row[3], -1, INT32_MAX), {0}};
+        *g = (mhe_grant){last,
+                         whole(row[1], 0, MHE_GRANT_PASSED_OVER),
+                         row[2] != 0,
+                         whole(row[3], -1, INT32_MAX),
+                         {0}};
         for (int32_t i = 0; i < MHE_GRANT_LOOKS; i++) {
             g->looks[i] = whole(row[4 + i], 0, INT32_MAX);
         }

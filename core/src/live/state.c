@@ -70,6 +70,7 @@ void mhi_live_publish(mhe_live *l) {
     }
     cJSON_AddNumberToObject(root, "frames", (double)l->feed.n_frames);
     cJSON_AddNumberToObject(root, "estimates", (double)l->feed.n_estimates);
+    cJSON_AddNumberToObject(root, "passed_over", (double)l->feed.n_passed_over);
     add_streams(l, root);
     add_electrodes(l, root);
     char *text = cJSON_PrintUnformatted(root);
@@ -114,6 +115,7 @@ mhe_status mhe_live_summary(mhe_live *l, char **json, mhe_error *err) {
     cJSON *root = cJSON_CreateObject();
     cJSON_AddNumberToObject(root, "frames", (double)l->feed.n_frames);
     cJSON_AddNumberToObject(root, "estimates", (double)l->feed.n_estimates);
+    cJSON_AddNumberToObject(root, "passed_over", (double)l->feed.n_passed_over);
     cJSON_AddNumberToObject(root, "out_of_order", (double)l->feed.n_out_of_order);
     cJSON *by = cJSON_AddObjectToObject(root, "by_status");
     for (int32_t i = 0; i < 5; i++) {
@@ -128,6 +130,8 @@ mhe_status mhe_live_summary(mhe_live *l, char **json, mhe_error *err) {
         cJSON_AddNumberToObject(c, "late_nodes", (double)counts.n_late_nodes);
         cJSON_AddNumberToObject(c, "dropped", (double)counts.n_dropped);
     }
+    cJSON_AddNumberToObject(root, "priority", l->priority.raised);
+    cJSON_AddBoolToObject(root, "memory_locked", l->priority.locked);
     add_streams(l, root);
     add_sinks(l, root);
     *json = cJSON_Print(root);

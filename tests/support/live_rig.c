@@ -74,12 +74,11 @@ mhe_status live_rig_run(live_rig *r) {
     const mhe_host host = {.size = sizeof host, .data = &r->words, .log = keep, .service = none};
     mhe_config *config = NULL;
     pthread_t thread;
-    r->words = (live_words){.n = 0};
-    (void)pthread_mutex_init(&r->words.mutex, NULL);
+    r->words = (live_words){.mutex = PTHREAD_MUTEX_INITIALIZER};
     (void)snprintf(out, sizeof out, "%s/%s", live_rig_folder(), r->name);
     (void)mkdir(out, 0777);
-    mhe_status status = mhe_config_parse("live.yaml", r->config, strlen(r->config), "/", NULL, 0, 0,
-                                         &host, &config, &r->err);
+    mhe_status status = mhe_config_parse("live.yaml", r->config, strlen(r->config), "/", NULL, 0,
+                                         r->trust ? MHE_CONFIG_TRUST : 0, &host, &config, &r->err);
     const mhe_live_setup setup = {
         .size = sizeof setup, .folder = out, .record = r->record, .wait = PATIENCE};
     status = status == MHE_OK ? mhe_live_open(config, &setup, &r->live, &r->err) : status;
@@ -97,8 +96,21 @@ mhe_status live_rig_run(live_rig *r) {
     mhe_live_close(r->live);
     r->live = NULL;
     mhe_config_close(config);
-    (void)pthread_mutex_destroy(&r->words.mutex);
     return status;
+}
+
+void live_rig_must_run(live_rig *r) {
+    if (live_rig_run(r) != MHE_OK) {
+        fail_msg("%s\n%s", r->err.text, r->words.text);
+    }
+}
+
+int live_rig_same(const char *a, const char *b, const char *file) {
+    char command[400];
+    const char *in = live_rig_folder();
+    (void)snprintf(command, sizeof command, "test -s %s/%s/%s && cmp %s/%s/%s %s/%s/%s", in, a,
+                   file, in, a, file, in, b, file);
+    return system(command) == 0;
 }
 
 double live_rig_number(const char *json, const char *key) {

@@ -31,6 +31,7 @@ typedef struct live_rig {
     const char *config; /* YAML */
     const char *record; /* NULL: none */
     double seconds;     /* of estimates; 0: no end */
+    int32_t trust;      /* the config may load plugins of its own */
     /* Runs beside it on a thread of its own, with `data`; NULL: nothing does. */
     void *(*director)(void *data);
     void *data;
@@ -43,6 +44,12 @@ typedef struct live_rig {
 mhe_status live_rig_run(live_rig *rig);
 
 double live_rig_number(const char *json, const char *key); /* the first of that name */
+
+/* Runs, and fails the test where the run does. */
+void live_rig_must_run(live_rig *rig);
+
+/* Whether two runs wrote the same bytes into a file that both have. */
+int live_rig_same(const char *a, const char *b, const char *file);
 
 /* The numbers of a table that was written; the rows without time. NULL: no such file. */
 double *live_rig_table(const char *name, const char *file, int32_t *n_rows, int32_t *n_columns);
