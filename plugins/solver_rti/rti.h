@@ -74,10 +74,14 @@ typedef struct rti_solver {
     double *lower, *upper;              /* [size_z] of w */
     double *lambda, *z_lower, *z_upper; /* at `here` */
     double *slope, *gaps;               /* scratch [size_z], [size_x] */
-    double *result;                     /* [size_z] w of the last solve */
-    int32_t has_result;                 /* it gave one; 2: its covariances are known */
-    double *spread;                     /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
-    double *gain, *rest, *joint;        /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
+    struct {
+        double *w, *lambda, *z_lower, *z_upper;
+        double stationarity, feasibility, complementarity, open;
+    } first;                     /* result of a program whose step is looked at twice */
+    double *result;              /* [size_z] w of the last solve */
+    int32_t has_result;          /* it gave one; 2: its covariances are known */
+    double *spread;              /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
+    double *gain, *rest, *joint; /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
     rti_pool *pool;
     rti_worker *workers;      /* [n_workers of the problem] */
     double *stage_cost;       /* [N+1] of the last evaluation, not scaled */

@@ -122,6 +122,33 @@ static int32_t is_nearer(rti_solver *s, const slopes *slope) {
     return rti_excess(&r) <= NEARER * s->least_excess;
 }
 
+/* The program's result is put aside, or is there again: what a step is made of. */
+static void keep_first(rti_solver *s) {
+    const size_t z = sizeof(double) * size_z(&s->shape), x = sizeof(double) * size_x(&s->shape);
+    const qp *q = &s->qp;
+    memcpy(s->first.w, q->w, z);
+    memcpy(s->first.z_lower, q->z_lower, z);
+    memcpy(s->first.z_upper, q->z_upper, z);
+    memcpy(s->first.lambda, q->lambda, x);
+    s->first.stationarity = q->stationarity;
+    s->first.feasibility = q->feasibility;
+    s->first.complementarity = q->complementarity;
+    s->first.open = q->open;
+}
+
+static void recall_first(rti_solver *s) {
+    const size_t z = sizeof(double) * size_z(&s->shape), x = sizeof(double) * size_x(&s->shape);
+    qp *q = &s->qp;
+    memcpy(q->w, s->first.w, z);
+    memcpy(q->z_lower, s->first.z_lower, z);
+    memcpy(q->z_upper, s->first.z_upper, z);
+    memcpy(q->lambda, s->first.lambda, x);
+    q->stationarity = s->first.stationarity;
+    q->feasibility = s->first.feasibility;
+    q->complementarity = s->first.complementarity;
+    q->open = s->first.open;
+}
+
 /* A second look at a full step that was refused: the program once more with the gaps that the step
  * left (second-order correction: Fletcher 1982; along curved constraints good steps are else
  * refused, the Maratos effect). The refused point's gaps are in trial. */
@@ -135,12 +162,10 @@ static int32_t second_look(rti_solver *s, const slopes *slope) {
             b[i] += s->trial.stages[k].b[i];
         }
     }
+    keep_first(s);
     const int32_t result = rti_program(s, 1);
     for (int32_t k = 0; k < shape->N; k++) {
         memcpy(s->here.stages[k].b, row_x(shape, s->gaps, k), bytes);
-    }
-    if (result == QP_LATE) {
-        return 0;
     }
     if (result == QP_SOLVED) {
         rti_reach(s, 1);
@@ -148,7 +173,7 @@ static int32_t second_look(rti_solver *s, const slopes *slope) {
             return 1;
         }
     }
-    (void)rti_program(s, 0); /* the first step again, to be shortened */
+    recall_first(s); /* to be shortened */
     return 0;
 }
 
