@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# A study on a real Slurm: controller, node and authentication of its own, started here with a folder and ports of their
+# A study, and a session's trials, on a real Slurm: controller, node and authentication of its own, started here with a folder and ports of their
 # own; a node that dies with its task, whose task is queued again; the results are those of a run without Slurm.
 #   slurm.sh PATH/mhe-study SOURCE_DIR
 set -u
@@ -136,5 +136,22 @@ grep -q 'trials are there already' cluster/slurm/*.log || fail "a requeued task 
 cp cluster/results.csv before.csv
 "$study" merge cluster > out.txt 2> err.txt || fail "merge: $(cat err.txt)"
 cmp before.csv cluster/results.csv || fail "merging changes the results"
+
+# ---- a session's trials: mhe-run --batch ----
+
+run=$(dirname "$study")/mhe-run demo=$source/models/arm19/demo.yaml
+printf 'name,horizon.window\nfive,5\nsix,6\nseven,7\n' > trials.csv
+keys=(--set output.picture=false --set solver.plugin=mhe.solver.rti)
+"$run" "$demo" --batch trials.csv --out here --quiet "${keys[@]}" > out.txt 2>&1 || fail "batch without Slurm: $(cat out.txt)"
+"$run" "$demo" --batch trials.csv --out there "${keys[@]}" --engine slurm --tasks 2 --option --time=20 > out.txt 2>&1 ||
+    fail "batch: $(cat out.txt)"
+job=$(sed -n 's/.*job \([0-9]*\):.*/\1/p' out.txt)
+[ -n "$job" ] || fail "no job: $(cat out.txt)"
+until_true 240 ended || fail "the job does not end: $(squeue -j "$job")"
+all_there() { [ "$(grep -c ',yes,' there/batch.csv)" -eq 3 ] && [ -s there/batch.html ]; }
+until_true 20 all_there || fail "no table of three: $(cat there/batch.csv there/slurm/*.log)"
+for trial in five six seven; do
+    cmp "here/$trial/forces.sto" "there/$trial/forces.sto" || fail "the results are not those of a run without Slurm"
+done
 
 finish "slurm"
