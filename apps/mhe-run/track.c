@@ -41,6 +41,7 @@ static mhe_status open_live(tracking *t, mhe_error *err) {
     const double deadline = 1e-3 * number(t, "realtime.deadline_ms");
     t->live.deadline =
         deadline > 0 ? deadline : LIVE_SHARE * info->ratio / t->summary.recording.rate;
+    t->live.kept = info->ratio;
     char *node = NULL;
     mhe_status status = mhe_estimator_set_deadline(t->estimator, t->live.deadline, err);
     if (status == MHE_OK) {
