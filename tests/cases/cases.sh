@@ -225,6 +225,22 @@ read_right zeros 0.005 '40 samples of a marker at exactly 0 0 0'
 config broken hinge.bioMod 'markers: broken.trc'
 trc 100 'if (k % 5 == 0) {c[1] = 1e30; c[5] = -3e12}' > broken.trc
 read_right broken 0.005 'samples of a marker are more than 100 km away'
+config unseen hinge.bioMod 'markers: unseen.trc'
+trc 100 'if (k % 4 == 0) c[1] = c[2] = c[3] = 9999' > unseen.trc
+read_right unseen 0.005 '10 samples of a marker have the same number three times (9.999 m)'
+config words hinge.bioMod 'markers: words.trc'
+awk -F '\t' 'BEGIN {OFS = FS} NR > 6 && NR % 4 == 0 {$3 = "NA"; $4 = "NULL"; $5 = "#N/A"}
+    NR > 6 && NR % 4 == 1 {$6 = $7 = $8 = "-"} {print}' good.trc > words.trc
+read_right words 0.005
+config commas hinge.bioMod 'markers: commas.trc'
+sed '7,$s/\([0-9]\)\.\([0-9]\)/\1,\2/g' good.trc > commas.trc
+read_right commas 0.005 "numbers with a comma ("
+config quoted hinge.bioMod 'markers: quoted.trc'
+sed '4s/ELB.L/"ELB.L"/;4s/WRI.M/WRI.M*/' good.trc > quoted.trc
+read_right quoted 0.005 'ELB.L'
+config nameless hinge.bioMod 'markers: nameless.trc'
+sed '4s/WRI.L//' good.trc > nameless.trc
+read_right nameless 0.005 'no label'
 config beyond hinge.bioMod 'markers: beyond.trc'
 trc 100 'if (k % 3 == 0) more = "\t1\t2\t3"' > beyond.trc
 read_right beyond 0.005 'what is beyond is left out'

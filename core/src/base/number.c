@@ -41,6 +41,13 @@ int32_t mhi_number(mhi_cell cell, double *value) {
 
 int32_t mhi_number_missing(mhi_cell cell) {
     static const char *const spellings[] = {"nan", "1.#qnan", "1.#ind", "1.#snan"};
+    static const char *const words[] = {"na", "n/a", "#n/a", "null", "none", "missing",
+                                        "-",  "--",  ".",    "?",    "*"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        if (cell.length == strlen(words[i]) && strncasecmp(cell.text, words[i], cell.length) == 0) {
+            return 1;
+        }
+    }
     if (cell.length == 0) {
         return 1;
     }

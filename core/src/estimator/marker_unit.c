@@ -91,16 +91,28 @@ void mhi_marker_settle_unit(mhi_recording *r, const mhe_description *d, double f
 
 void mhi_marker_leave_out_distant(mhi_recording *r, int32_t n_markers, const char *path,
                                   const mhe_host *host) {
-    ptrdiff_t n = 0;
+    ptrdiff_t n = 0, n_same = 0;
+    double same = 0;
     for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * n_markers; i++) {
         double *p = r->markers + 3 * i;
-        if (fabs(p[0]) > FARTHEST || fabs(p[1]) > FARTHEST || fabs(p[2]) > FARTHEST) {
+        if (p[0] == p[1] && p[1] == p[2]) {
+            same = p[0];
+            p[0] = p[1] = p[2] = NAN;
+            n_same++;
+        } else if (fabs(p[0]) > FARTHEST || fabs(p[1]) > FARTHEST || fabs(p[2]) > FARTHEST) {
             p[0] = p[1] = p[2] = NAN;
             n++;
         }
     }
+    char line[512];
+    if (n_same > 0) {
+        (void)snprintf(line, sizeof line,
+                       "%.300s: %td samples of a marker have the same number three times (%g m): "
+                       "taken as gaps",
+                       path, n_same, same);
+        host->log(host, MHE_LOG_WARNING, line);
+    }
     if (n > 0) {
-        char line[512];
         (void)snprintf(
             line, sizeof line,
             "%.300s: %td samples of a marker are more than %g km away: taken as gaps; is "

@@ -11,8 +11,9 @@
  * [cold] */
 void mhi_marker_settle_unit(mhi_recording *recording, const mhe_description *model, double factor,
                             const char *path, const mhe_host *host);
-/* Samples beyond any laboratory (a broken file's bytes read as numbers) become gaps; how many is
- * told to the host. [cold] */
+/* Samples whose three coordinates are one number (9999, -1: how systems write that a marker was not
+ * seen), and those beyond any laboratory (a broken file's bytes read as numbers) become gaps; how
+ * many is told to the host. [cold] */
 void mhi_marker_leave_out_distant(mhi_recording *recording, int32_t n_markers, const char *path,
                                   const mhe_host *host);
 

@@ -112,7 +112,7 @@ int32_t mhi_table_find(const mhi_table *table, const char *name) {
 }
 
 static const char *pass_over(const char *text) {
-    return text + strspn(text, "._- ");
+    return text + strspn(text, "._- \"'*");
 }
 
 int32_t mhi_names_alike(const char *a, const char *b) {

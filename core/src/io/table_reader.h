@@ -20,6 +20,7 @@ typedef struct mhi_table_reader {
     int32_t decimals;            /* most that a time is printed with */
     int32_t n_equal, equal_line; /* rows whose time is that of the row before; the first's line */
     int32_t n_missing;           /* empty cells */
+    int32_t has_commas;          /* decimal ones; told */
     mhi_kinds kinds;             /* of warnings */
     int32_t no_memory;           /* for one of them: the table is not handed out */
     mhi_decoded decoded;

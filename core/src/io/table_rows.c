@@ -87,6 +87,7 @@ static mhe_status grow(mhi_table_reader *reader) {
 /* Digits behind the point of a number as it is printed; one with an exponent has no end of them. */
 static int32_t count_decimals(mhi_cell cell) {
     const char *point = memchr(cell.text, '.', cell.length);
+    point = point == NULL ? memchr(cell.text, ',', cell.length) : point;
     if (memchr(cell.text, 'e', cell.length) != NULL ||
         memchr(cell.text, 'E', cell.length) != NULL) {
         return 17;
@@ -94,11 +95,35 @@ static int32_t count_decimals(mhi_cell cell) {
     return point == NULL ? 0 : (int32_t)(cell.text + cell.length - point) - 1;
 }
 
+/* A number, also one with a decimal comma: no row is split by commas that has tabs or blanks. */
+static int32_t read_number(mhi_table_reader *reader, mhi_cell cell, double *value) {
+    char copy[64], shown[MHI_SHOWN];
+    if (mhi_number(cell, value)) {
+        return 1;
+    }
+    const char *comma = memchr(cell.text, ',', cell.length);
+    if (comma == NULL || cell.length >= sizeof copy ||
+        memchr(cell.text, '.', cell.length) != NULL) {
+        return 0;
+    }
+    memcpy(copy, cell.text, cell.length);
+    copy[comma - cell.text] = '.';
+    if (!mhi_number((mhi_cell){copy, cell.length}, value)) {
+        return 0;
+    }
+    if (!reader->has_commas) {
+        reader->has_commas = 1;
+        mhi_table_warn(reader, "numbers with a comma ('%s') are read as with a point",
+                       mhi_cell_show(shown, cell));
+    }
+    return 1;
+}
+
 static mhe_status take_time(mhi_table_reader *reader, mhi_cell cell) {
     mhi_table *table = reader->table;
     char shown[MHI_SHOWN];
     double time = 0;
-    if (!mhi_number(cell, &time)) {
+    if (!read_number(reader, cell, &time)) {
         return mhi_table_fail(reader, "time '%s' is not a finite number of seconds",
                               mhi_cell_show(shown, cell));
     }
@@ -119,7 +144,7 @@ static mhe_status take_time(mhi_table_reader *reader, mhi_cell cell) {
 static mhe_status take_value(mhi_table_reader *reader, int32_t column, mhi_cell cell,
                              double *value) {
     const mhi_table *table = reader->table;
-    if (mhi_number(cell, value)) {
+    if (read_number(reader, cell, value)) {
         *value *= table->unit;
         return MHE_OK;
     }

@@ -91,9 +91,33 @@ static mhe_status read_header(mhi_table_reader *reader, trc_header *header) {
     return status;
 }
 
+/* Names stand above the first of their three columns; where one is missing between others its place
+ * is kept, or all behind it would be another's. Else words as they come. */
+static mhe_status split_names(mhi_table_reader *reader) {
+    mhe_status status = mhi_table_split(reader, '\t');
+    int32_t last = 0, in_place = 1;
+    for (int32_t i = 2; i < reader->n_cells && status == MHE_OK; i++) {
+        const int32_t named = reader->cells[i].length > 0;
+        last = named ? i : last;
+        in_place = in_place && (!named || (i - 2) % 3 == 0);
+    }
+    if (status != MHE_OK || !in_place || last < 5) {
+        return status == MHE_OK ? split_words(reader) : status;
+    }
+    int32_t n = 2;
+    for (int32_t i = 2; i <= last; i += 3) {
+        reader->cells[n++] = reader->cells[i];
+    }
+    reader->n_cells = n;
+    return MHE_OK;
+}
+
 /* Lines 4 and 5: names; and X1 Y1 Z1 ..., which may be absent. */
 static mhe_status read_labels(mhi_table_reader *reader, const trc_header *header) {
-    mhe_status status = next_words(reader, "the marker names (Frame# Time ...)");
+    mhe_status status = mhi_table_next(reader)
+                            ? split_names(reader)
+                            : mhi_table_fail(reader, "the file ends before %s",
+                                             "the marker names (Frame# Time ...)");
     if (status != MHE_OK) {
         return status;
     }
