@@ -66,6 +66,10 @@ void mhi_calibration_close(mhi_calibration *calibration);
 /* Finds the parameters and how well they are known. [cold] */
 mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);
 
+/* search.c: from a start s to the solution, c->info says how it ended. */
+mhe_status mhi_calibration_search(mhi_calibration *c, mhi_ocp *ocp, const mhe_solver_ops *solver,
+                                  void *self, mhe_solution *s, mhe_error *err);
+
 /* choose.c: the plan's entries as numbers, and which number of the model each belongs to. */
 mhe_status mhi_calibration_choose(mhi_calibration *c, mhe_error *err);
 /* Number of a muscle (body) now; where it is not estimated: 1 of a factor, else 0. */
