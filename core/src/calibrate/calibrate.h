@@ -43,7 +43,7 @@ typedef struct mhi_calibration {
     mhi_motion *motions;    /* [plan.n_recordings] */
     mhi_estimated *list;    /* [n] */
     int32_t n;
-    int32_t insertions, masses;     /* 1: are among them */
+    int32_t asked[MHI_OF_KINDS];    /* 1: are among them */
     int32_t *list_of[MHI_OF_KINDS]; /* numbers of muscles, markers, bodies; -1: none. Of offsets
                                      * the first of three, insertions' [n_m x 3] */
     double *covariance;             /* [n x n] of the list */

@@ -82,17 +82,19 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                         run->path);
     }
     for (int32_t i = MHI_OF_STRENGTH; i <= MHI_OF_SLACK; i++) {
-        names[n_names++] = mhi_plan_names[i];
+        if (c->asked[i]) {
+            names[n_names++] = mhi_plan_names[i];
+        }
     }
-    if (c->insertions) {
+    if (c->asked[MHI_OF_INSERTION]) {
         names[n_names++] = MHI_INSERTION;
     }
-    if (c->masses) {
+    if (c->asked[MHI_OF_MASS]) {
         names[n_names++] = MHI_MASS;
     }
     const mhi_node *model = mhi_node_find(mhi_tree_root(run->tree), "model");
     const mhi_node *paths = model == NULL ? NULL : mhi_node_find(model, "paths");
-    if (c->insertions && paths != NULL && paths->text != NULL &&
+    if (c->asked[MHI_OF_INSERTION] && paths != NULL && paths->text != NULL &&
         strcmp(paths->text, "fitted") == 0) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, paths,
                            "model.paths: where insertions are estimated paths must be exact");
