@@ -204,6 +204,10 @@ config hall hinge.bioMod 'markers: hall.trc'
 trc 100 'for (i = 1; i <= 7; i += 3) {y = c[i + 1]; c[i] += 1000; c[i + 1] = -c[i + 2] + 2000; c[i + 2] = y + 3000}' > hall.trc
 refused hall 'turned by 90 degrees' 'data.transform: {rotate: x-90, shift: [-1.000, -3.000, 2.000]}'
 remedied hall 'transform: {rotate: x-90, shift: [-1, -3, 2]}'
+config exchanged hinge.bioMod 'markers: exchanged.trc'
+sed '4s/WRI.L/X/;4s/WRI.M/WRI.L/;4s/X/WRI.M/' good.trc > exchanged.trc
+verdict exchanged no 'markers WRI.L and WRI.M look exchanged' 'data.labels: {WRI.L: WRI.M, WRI.M: WRI.L}'
+remedied exchanged 'labels: {WRI.L: WRI.M, WRI.M: WRI.L}'
 config inches hinge.bioMod 'markers: inches.trc'
 trc 100 'for (i = 1; i <= 9; i++) c[i] /= 25.4' > inches.trc
 verdict inches no 'a body 0.03937 times as large as the model' 'data.transform: {scale: 25.4}'

@@ -3,9 +3,11 @@
 #include "base/pi.h"
 #include "base/text.h"
 #include "believe/believe.h"
+#include "believe/exchange.h"
 #include "believe/pose.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define FAR 0.02        /* m RMS: further than skin and model make it; the whole search is done */
@@ -22,6 +24,7 @@
 #define UNIT 1.8        /* times: people differ less */
 #define LARGE_TURN 15.0 /* degrees: as many are the joints off */
 #define LARGE_SHIFT 0.1 /* m */
+#define FITTING 0.005   /* m RMS: what explains so much is the explanation */
 #define LYING 55.0      /* degrees from upright throughout */
 
 typedef struct trial {
@@ -283,6 +286,31 @@ static void check_upright(mhi_pose_search *s, const char *path, double as_is,
     }
 }
 
+/* Where no transform explains it: two labels exchanged, by which more comes right than by any
+ * transform. 1: told. */
+static int32_t tell_exchange(const char *path, const mhi_system *system, const mhi_recording *r,
+                             const trial *best, double as_is, mhi_findings *findings) {
+    const mhe_description *d = mhi_system_description(system);
+    mhi_exchange pair;
+    uint8_t *all = best->rms > FITTING ? malloc((size_t)d->n_markers + 1) : NULL;
+    if (all == NULL) {
+        return 0;
+    }
+    memset(all, 1, (size_t)d->n_markers);
+    const int32_t n = mhi_exchange_find(system, r, all, &pair, 1);
+    free(all);
+    if (n == 0 || !(pair.fixed < GAIN * fmin(best->rms, as_is))) {
+        return 0;
+    }
+    const char *a = d->markers[pair.a].name, *b = d->markers[pair.b].name;
+    mhi_findings_add(findings, as_is > HOPELESS ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL, "",
+                     "%s: markers %s and %s look exchanged: all markers are %.1f mm from the "
+                     "nearest posture (RMS), %.1f mm with these labels exchanged",
+                     path, a, b, 1e3 * pair.as_is, 1e3 * pair.fixed);
+    mhi_findings_advise(findings, "data.labels: {%s: %s, %s: %s}", a, b, b, a);
+    return 1;
+}
+
 mhe_status mhi_believe_fit(const mhi_run *run, const mhi_system *system, const mhi_recording *r,
                            mhi_findings *findings, mhe_error *err) {
     mhi_pose_search *s = NULL;
@@ -303,7 +331,10 @@ mhe_status mhi_believe_fit(const mhi_run *run, const mhi_system *system, const m
         if (as_is > FAR) {
             try_axes(s, &best);
         }
-        if (best.rms < GAIN * as_is && as_is - best.rms > WORTH && !is_slight(&best.pose)) {
+        if (as_is > FAR && tell_exchange(path, system, r, &best, as_is, findings)) {
+            mhi_pose_close(s);
+            return MHE_OK;
+        } else if (best.rms < GAIN * as_is && as_is - best.rms > WORTH && !is_slight(&best.pose)) {
             tell_transform(path, &best, as_is, findings);
         } else if (as_is > HOPELESS) {
             mhi_findings_add(

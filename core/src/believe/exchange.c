@@ -8,6 +8,7 @@
 #include <string.h>
 
 #define FRAMES 10        /* of the recording that are looked at */
+#define TRIES 4          /* postures that the first frame is looked for from */
 #define FOUND 1e-5       /* rad or m: a posture that moves less is found */
 #define FITS_BETTER 0.75 /* of the RMS distance that must not remain */
 
@@ -38,6 +39,7 @@ static int search_open(search *s, const mhi_system *system, const mhi_recording 
         return 0;
     }
     mhi_start_set_enough(s->start, FOUND);
+    mhi_start_set_tries(s->start, TRIES);
     mhi_work_begin(&s->work, mhi_start_affordable(s->start) / 2, 0);
     mhi_system_context_set_work(s->context, &s->work);
     return 1;

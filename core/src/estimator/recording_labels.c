@@ -95,6 +95,31 @@ static mhe_status take_subject(mhi_table *table, int32_t width, const mhi_run *r
     return status;
 }
 
+/* All columns are found before the first gets its new name: two labels may be exchanged. */
+static mhe_status rename_columns(mhi_recording *r, const mhe_text_map *map, mhi_table *table,
+                                 mhe_error *err) {
+    int32_t *column = malloc(sizeof *column * (size_t)map->n);
+    mhe_status status = column != NULL && r->labels_used != NULL
+                            ? MHE_OK
+                            : mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    for (int32_t i = 0; i < map->n && status == MHE_OK; i++) {
+        column[i] = mhi_table_find(table, map->keys[i]);
+        column[i] = column[i] < 0 ? mhi_table_find_alike(table, map->keys[i], NULL) : column[i];
+    }
+    for (int32_t i = 0; i < map->n && status == MHE_OK; i++) {
+        char *name = column[i] < 0 ? NULL : strdup(map->values[i]);
+        if (name != NULL) {
+            free(table->labels[column[i]]);
+            table->labels[column[i]] = name;
+            r->labels_used[i] = 1;
+        } else if (column[i] >= 0) {
+            status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+    }
+    free(column);
+    return status;
+}
+
 mhe_status mhi_recording_name(mhi_recording *r, const mhi_run *run, mhi_table *table, int32_t width,
                               mhe_error *err) {
     const mhe_text_map *map = &run->data.labels;
@@ -104,22 +129,7 @@ mhe_status mhi_recording_name(mhi_recording *r, const mhi_run *run, mhi_table *t
     if (r->labels_used == NULL && map->n > 0) {
         r->labels_used = calloc((size_t)map->n, 1);
     }
-    for (int32_t i = 0; i < map->n && status == MHE_OK; i++) {
-        int32_t column = mhi_table_find(table, map->keys[i]);
-        column = column < 0 ? mhi_table_find_alike(table, map->keys[i], NULL) : column;
-        if (column < 0) {
-            continue;
-        }
-        char *name = strdup(map->values[i]);
-        if (name == NULL || r->labels_used == NULL) {
-            free(name);
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-        free(table->labels[column]);
-        table->labels[column] = name;
-        r->labels_used[i] = 1;
-    }
-    return status;
+    return status == MHE_OK && map->n > 0 ? rename_columns(r, map, table, err) : status;
 }
 
 void mhi_recording_warn_labels(const mhi_recording *r, const mhi_run *run, const mhe_host *host) {
