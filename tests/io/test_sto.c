@@ -73,6 +73,8 @@ static void accepted_variations(void **state) {
     /* commas; a CSV without any header */
     expect_two_rows("anything\nendheader\ntime,a,b\n0,1,2\n0.01, 3, 4\n", NULL);
     expect_two_rows("time,a,b\n0,1,2\n0.01,3,4\n", "no header with 'endheader'");
+    /* a decimal comma where cells are parted by tabs */
+    expect_two_rows("endheader\ntime\ta\tb\n0\t1,0\t2\n0,01\t3\t4,0\n", "with a comma ('1,0')");
     /* labels by tabs, rows by blanks; a title that looks like labels */
     expect_two_rows("endheader\ntime\ta\tb\n0 1 2\n0.01 3 4\n", NULL);
     expect_two_rows("time, a title\n1 2 3 go\nendheader\ntime\ta\tb\n0\t1\t2\n0.01\t3\t4\n", NULL);
@@ -215,7 +217,7 @@ static void refused(void **state) {
     refuse("endheader\ntime\ta\nnan\t1\n", "time 'nan' is not a finite number");
     refuse("endheader\ntime\ta\n\t1\n", "time '' is not a finite number");
     refuse("endheader\ntime\ta\n0\tabc\n", "column 'a': 'abc' is not a finite number");
-    refuse("endheader\ntime\ta\n0\t1,5\n", "a point, no comma");
+    refuse("endheader\ntime\ta\n0\t1,5,2\n", "a point, no comma");
     refuse("endheader\ntime\ta\n0\t1.5.2\n", "'1.5.2' is not");
     refuse("endheader\ntime\ta\n0\tinf\n", "'inf' is not");
     refuse("endheader\ntime\ta\n0\t1e999\n", "'1e999' is not");
