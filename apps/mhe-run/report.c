@@ -167,6 +167,8 @@ static const char head[] =
     "svg{width:100%;background:#f6f6f6}path{fill:none;stroke-width:1.5}\n"
     ".estimated{stroke:#1f5fa8}.measured{stroke:#d9822b}.true{stroke:#999;stroke-width:3}\n"
     ".band{fill:#1f5fa8;fill-opacity:.18;stroke:none}\n"
+    ".verdict{padding:.4em .6em;font-weight:bold;background:#eee;border-left:6px solid #999}\n"
+    ".yes{border-color:#2a8a43}.doubtful{border-color:#d9a400}.no{border-color:#c0392b}\n"
     "pre{white-space:pre-wrap;overflow-wrap:anywhere}\n"
     "@media(max-width:600px){body{margin:1em auto}\n"
     "div{grid-template-columns:repeat(auto-fill,minmax(150px,1fr))}h1{font-size:1.4em}}\n"
@@ -177,12 +179,28 @@ static const rows *shown(const rows *r) {
     return r->table == NULL ? NULL : r;
 }
 
+/* The first line, where it is "usable: WORD", as one that is not overlooked; what follows it. */
+static const char *add_verdict(mhi_text *out, const char *summary) {
+    static const char *const words[] = {"yes", "doubtful", "no"};
+    for (size_t i = 0; i < sizeof words / sizeof words[0]; i++) {
+        char line[32];
+        const size_t n = (size_t)snprintf(line, sizeof line, "usable: %s\n", words[i]);
+        if (strncmp(summary, line, n) == 0) {
+            mhi_text_add(out, "<p class=\"verdict %s\">usable: %s</p>\n", words[i], words[i]);
+            return summary + n;
+        }
+    }
+    return summary;
+}
+
 static void compose(mhi_text *out, const char *name, const char *summary, const rows *tables) {
     mhi_text_add(out, "%s<title>", head);
     add_escaped(out, name);
     mhi_text_add(out, "</title>\n<h1>");
     add_escaped(out, name);
-    mhi_text_add(out, "</h1>\n<pre>");
+    mhi_text_add(out, "</h1>\n");
+    summary = add_verdict(out, summary);
+    mhi_text_add(out, "<pre>");
     add_escaped(out, summary);
     mhi_text_add(
         out,
@@ -194,8 +212,8 @@ static void compose(mhi_text *out, const char *name, const char *summary, const 
     const rows *truth = shown(&tables[5]), *states = shown(&tables[0]);
     const rows *sd = shown(&tables[6]);
     const quantity all[] = {
-        {"Joint coordinates (of sliders 1/57.3 m)", "q_", "deg", states, NULL, truth, "q_",
-         MHI_DEGREES, 1, sd, "q_"},
+        {"Joint coordinates (of a slider, 1 deg is 17.5 mm)", "q_", "deg", states, NULL, truth,
+         "q_", MHI_DEGREES, 1, sd, "q_"},
         {"Activation against EMG", "a_", "of 1", states, shown(&tables[3]), truth, "a_", 1, 0.1, sd,
          "a_"},
         {"Muscle forces", "", "N", shown(&tables[1]), NULL, truth, "F_", 1, 10, sd, "force_"},
