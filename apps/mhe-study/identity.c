@@ -68,6 +68,9 @@ static mhe_status add_parts(const study *s, seen *known, mhi_text *program, mhi_
         if (status == MHE_OK) {
             status = add_once(known, run->model_file.file, models, err);
         }
+        if (status == MHE_OK && run->model_file.motion != NULL) {
+            status = add_once(known, run->model_file.motion, models, err);
+        }
     }
     return status;
 }

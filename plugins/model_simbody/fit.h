@@ -38,6 +38,11 @@ mhe_status fits_create(const mhe_host *host, const mhe_description *description,
                        double tolerance, double range, path_fits **out, mhe_error *err);
 void fits_free(path_fits *fits);
 
+/* Where coordinate i is fitted: a margin about the motion that the description knows of, else over
+ * the share of its range about its default, and a margin. */
+void fit_range(const mhe_description *description, int32_t i, double share, double *lower,
+               double *upper);
+
 /* ---- fit_cache.c ---- */
 
 /* A number for all that lengths depend on. */

@@ -16,7 +16,7 @@
 #define MAGIC 0x32746966656d6800u /* "mhefit2", backwards */
 #define MOST 4096                 /* of any count in a file */
 /* to be raised with every change of lengths or fits: older files are not read */
-#define LENGTHS 4
+#define LENGTHS 5
 
 /* ---- digest ---- */
 
@@ -102,8 +102,9 @@ uint64_t fits_digest(const mhe_description *d, double tolerance, double range) {
     mix_doubles(&digest, &range, 1);
     mix_count(&digest, d->n_coordinates);
     for (int32_t i = 0; i < d->n_coordinates; i++) {
-        mix_doubles(&digest, &d->coordinates[i].lower, 1);
-        mix_doubles(&digest, &d->coordinates[i].upper, 1);
+        double over[2];
+        fit_range(d, i, range, &over[0], &over[1]);
+        mix_doubles(&digest, over, 2);
         mix_doubles(&digest, &d->coordinates[i].value, 1);
         mix_count(&digest, d->coordinates[i].rotational);
     }

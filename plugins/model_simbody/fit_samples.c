@@ -7,6 +7,9 @@
 #include <string.h>
 
 #define MARGIN 0.05 /* of the coordinates' ranges, on both sides */
+/* beyond a motion that is known, on both sides: of its width, and at least (rad or m) */
+#define MOTION_MARGIN 0.2
+#define LEAST_MARGIN 0.05
 #define WIDEST_ANGLE 3.141592653589793
 #define WIDEST_SHIFT 1.0 /* m */
 
@@ -26,6 +29,34 @@ void samples_free(samples *s) {
     free(s->lower);
 }
 
+void fit_range(const mhe_description *d, int32_t i, double share, double *lower, double *upper) {
+    const mhe_coordinate *c = &d->coordinates[i];
+    double widest = c->rotational ? WIDEST_ANGLE : WIDEST_SHIFT;
+    *lower = fmax(c->lower, -widest);
+    *upper = fmin(c->upper, widest);
+    double width = *upper - *lower;
+    if (d->motion_lower != NULL && d->motion_upper[i] >= d->motion_lower[i]) {
+        double margin =
+            fmax(LEAST_MARGIN, MOTION_MARGIN * (d->motion_upper[i] - d->motion_lower[i]));
+        /* no farther than a fit of all goes, unless the motion itself does */
+        *lower =
+            fmax(d->motion_lower[i] - margin, fmin(*lower - MARGIN * width, d->motion_lower[i]));
+        *upper =
+            fmin(d->motion_upper[i] + margin, fmax(*upper + MARGIN * width, d->motion_upper[i]));
+        return;
+    }
+    double middle = fmax(*lower, fmin(*upper, c->value));
+    *lower = middle + share * (*lower - middle);
+    *upper = middle + share * (*upper - middle);
+    double margin = MARGIN * (*upper - *lower);
+    *lower -= margin;
+    *upper += margin;
+    if (!(*upper > *lower)) {
+        *lower = c->value - 0.01;
+        *upper = c->value + 0.01;
+    }
+}
+
 mhe_status samples_make(const mhe_description *d, void *model, double range, samples *s,
                         mhe_error *err) {
     size_t n_q = (size_t)d->n_coordinates, n_p = (size_t)d->n_paths;
@@ -41,20 +72,8 @@ mhe_status samples_make(const mhe_description *d, void *model, double range, sam
     }
     s->upper = s->lower + n_q;
     double *still = s->upper + n_q;
-    for (size_t i = 0; i < n_q; i++) {
-        double widest = d->coordinates[i].rotational ? WIDEST_ANGLE : WIDEST_SHIFT;
-        s->lower[i] = fmax(d->coordinates[i].lower, -widest);
-        s->upper[i] = fmin(d->coordinates[i].upper, widest);
-        double middle = fmax(s->lower[i], fmin(s->upper[i], d->coordinates[i].value));
-        s->lower[i] = middle + range * (s->lower[i] - middle);
-        s->upper[i] = middle + range * (s->upper[i] - middle);
-        double margin = MARGIN * (s->upper[i] - s->lower[i]);
-        s->lower[i] -= margin;
-        s->upper[i] += margin;
-        if (!(s->upper[i] > s->lower[i])) {
-            s->lower[i] = d->coordinates[i].value - 0.01;
-            s->upper[i] = d->coordinates[i].value + 0.01;
-        }
+    for (int32_t i = 0; i < d->n_coordinates; i++) {
+        fit_range(d, i, range, &s->lower[i], &s->upper[i]);
     }
     mhe_status status = simbody_context_create(model, &context, err);
     for (size_t k = 0; k < POSES && status == MHE_OK; k++) {

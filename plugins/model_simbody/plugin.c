@@ -14,8 +14,9 @@ static const mhe_option simbody_options[] = {
     MHE_OPT_REAL(struct simbody_config, paths_tolerance, 5e-4, 1e-6, 0.1, "m",
                  "RMS error allowed in fitted lengths; twice that (per radian) in moment arms."),
     MHE_OPT_REAL(struct simbody_config, paths_range, 1.0, 0.01, 1.0, "1",
-                 "Share of each coordinate's range, about its default, that paths are fitted over; "
-                 "beyond it they are exact."),
+                 "Share of each coordinate's range, about its default, that paths are fitted over "
+                 "where no motion is known (model.motion, data.angles: then its range and a fifth "
+                 "more on both sides); beyond it they are exact."),
 };
 
 static const mhe_model_ops simbody_ops = {

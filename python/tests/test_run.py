@@ -116,38 +116,3 @@ def test_what_cannot_run(tmp_path):
     empty.write_text("")
     with pytest.raises(myohorizon.Error):
         myohorizon.run(empty)
-
-
-def test_within_five_per_cent_of_mhe_run():
-    """CPU time of the frames' loop in Python, less that of the library's calls in it."""
-    import time
-
-    import myohorizon.results as module
-    inside = [0.0]
-    real = module.lib
-
-    class Timed:
-        def __getattr__(self, name):
-            found = getattr(real, name)
-            if name not in ("mhe_recording_frame", "mhe_estimator_push", "mhe_findings_add"):
-                return found
-
-            def call(*arguments):
-                begin = time.process_time()
-                try:
-                    return found(*arguments)
-                finally:
-                    inside[0] += time.process_time() - begin
-            return call
-    config = myohorizon._config.Config(DEMO)
-    r = module._Run(config)
-    module.lib = Timed()
-    try:
-        begin = time.process_time()
-        r.estimate(None)
-        whole = time.process_time() - begin
-    finally:
-        module.lib = real
-        r.close()
-        config.close()
-    assert whole - inside[0] < 0.05 * inside[0]

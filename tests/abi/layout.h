@@ -285,7 +285,7 @@ AT(mhe_loop, r, 24);
 AT(mhe_loop, p, 168);
 AT(mhe_loop, line, 216);
 
-SIZE(mhe_description, 288);
+SIZE(mhe_description, 304);
 AT(mhe_description, size, 0);
 AT(mhe_description, name, 8);
 AT(mhe_description, source, 16);
@@ -327,6 +327,8 @@ AT(mhe_description, warnings, 256);
 AT(mhe_description, n_dropped, 264);
 AT(mhe_description, dropped, 272);
 AT(mhe_description, joints, 280);
+AT(mhe_description, motion_lower, 288);
+AT(mhe_description, motion_upper, 296);
 
 SIZE(mhe_block, 72);
 AT(mhe_block, name, 0);

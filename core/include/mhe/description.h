@@ -345,6 +345,10 @@ typedef struct mhe_description {
     const char *const *dropped;
     const char *const *joints; /* [n_bodies] names of the joints that carry the bodies; an entry is
                                 * NULL where a file gives them none; NULL: no names */
+    /* Where the motion at hand keeps to, [n_coordinates] each, without a margin: what a model may
+     * be good at without being so everywhere. NaN: of this coordinate it is not known; NULL: of
+     * none. */
+    const double *motion_lower, *motion_upper;
 } mhe_description;
 
 #ifdef __cplusplus

@@ -36,6 +36,7 @@ typedef struct mhi_model_section {
     int32_t unsupported;    /* MHI_UNSUPPORTED_* */
     mhe_text_list locked;   /* coordinates that stay at the file's value */
     mhe_text_map locked_at; /* coordinates that stay at this value, rad or m */
+    const char *motion;     /* .sto .mot: a motion like the one to come */
 } mhi_model_section;
 
 /* The key of data.marker_weights that names a file; one text alone is its value. */

@@ -270,7 +270,8 @@ static mhe_status read_plugin_section(const mhi_reader *r, const mhi_section *s)
         run->model_file = (mhi_model_section){.file = own.file,
                                               .unsupported = own.unsupported,
                                               .locked = own.locked,
-                                              .locked_at = own.locked_at};
+                                              .locked_at = own.locked_at,
+                                              .motion = own.motion};
     }
     return status;
 }

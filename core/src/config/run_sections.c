@@ -34,6 +34,9 @@ static const mhe_option model_options[] = {
                   "the estimate."),
     MHE_OPT_MAP(mhi_use_section, locked_at, 0,
                 "Coordinates that stay at a value of their own, {NAME: rad or m}."),
+    MHE_OPT_PATH(mhi_use_section, motion, 0,
+                 "Joint angles of a motion like the one to come (.sto, .mot; an earlier estimate): "
+                 "fitted paths are fitted to its range, with a margin. data.angles unless given."),
 };
 
 static const mhe_option muscle_options[] = {

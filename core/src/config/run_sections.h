@@ -18,6 +18,7 @@ typedef struct mhi_use_section {
     int32_t unsupported;         /* model */
     mhe_text_list locked;        /* model */
     mhe_text_map locked_at;      /* model */
+    const char *motion;          /* model */
     double weight, sigma, huber; /* costs */
     double delay;                /* sources */
 } mhi_use_section;

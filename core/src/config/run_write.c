@@ -15,6 +15,7 @@ static void write_use(const mhi_run *run, const mhi_section *section, const mhi_
                                  .unsupported = run->model_file.unsupported,
                                  .locked = run->model_file.locked,
                                  .locked_at = run->model_file.locked_at,
+                                 .motion = run->model_file.motion,
                                  .weight = use->weight,
                                  .sigma = use->sigma,
                                  .huber = use->huber,

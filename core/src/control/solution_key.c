@@ -44,6 +44,9 @@ static mhe_status add_program(const mhi_run *run, mhi_text *key, mhe_error *err)
     if (status == MHE_OK) {
         status = add_file(key, run->model_file.file, err);
     }
+    if (status == MHE_OK && run->model_file.motion != NULL) {
+        status = add_file(key, run->model_file.motion, err);
+    }
     mhi_run_write(run, key);
     return status;
 }

@@ -29,7 +29,8 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
                         "%s (%d such element%s; 'model.unsupported: warn' goes on without)",
                         d->unsupported[0], d->n_unsupported, d->n_unsupported == 1 ? "" : "s");
     }
-    return mhi_estimator_lock(run, *description, err);
+    status = mhi_estimator_lock(run, *description, err);
+    return status == MHE_OK ? mhi_estimator_motion(run, *description, host, err) : status;
 }
 
 /* Puts the line of the config before the refusal of a plugin, which err->part names. */

@@ -79,6 +79,10 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
 
 /* locked.c: takes what the model section locks out of a description just read. */
 mhe_status mhi_estimator_lock(const mhi_run *run, mhe_description *description, mhe_error *err);
+/* What the description knows of the motion to come: the range of model.motion, else of data.angles.
+ * [cold] */
+mhe_status mhi_estimator_motion(const mhi_run *run, mhe_description *description,
+                                const mhe_host *host, mhe_error *err);
 
 /* feed.c: means of the intervals that are not complete yet, as far as their samples go. */
 mhe_status mhi_feed_before_solve(mhe_estimator *e, mhe_error *err);

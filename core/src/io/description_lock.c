@@ -257,6 +257,10 @@ static void lock_forces(lock *l, mhe_description *d) {
     d->n_actuators = n;
 }
 
+double *mhi_description_take(mhe_description *d, int32_t n) {
+    return MHI_TAKE(&((mhi_owned_description *)(void *)d)->arena, double, n);
+}
+
 mhe_status mhi_description_lock(mhe_description *d, const double *at, mhe_error *err) {
     lock l = {.arena = &((mhi_owned_description *)(void *)d)->arena};
     l.number = take(&l, d->n_coordinates + d->n_dependents, sizeof *l.number);

@@ -19,6 +19,9 @@ mhe_status mhi_model_read_unlocked(const char *path, mhe_description **descripti
  * that value, as locked ones of the file are; the rest keep their order. MHE_E_MEMORY. [cold] */
 mhe_status mhi_description_lock(mhe_description *description, const double *at, mhe_error *err);
 
+/* Room for n numbers that lives as long as the description; NULL: no memory. [cold] */
+double *mhi_description_take(mhe_description *description, int32_t n);
+
 /* mhi_model_read from memory; `name` is used in messages. [cold] */
 mhe_status mhi_model_parse(const char *name, const char *text, size_t length,
                            mhe_description **description, mhe_error *err);
