@@ -35,7 +35,10 @@ function picture(p, group, times, pick) {
 function open(r) {
   document.body.classList.add("recorded");
   begin(r); up = r.up;
-  $("findings").textContent = r.summary;
+  const verdict = /^usable: (yes|doubtful|no)\n/.exec(r.summary); // not to be overlooked
+  if (verdict) { $("verdict").textContent = verdict[0].trim(); $("verdict").className = "verdict " + verdict[1]; }
+  $("verdict").hidden = !verdict;
+  $("findings").textContent = verdict ? r.summary.slice(verdict[0].length) : r.summary;
   $("h-figure").closest("section").hidden = !labels("skeleton").length && !labels("markers").length;
   const all = numbers(r.values), n = r.signals.reduce((k, s) => k + s.labels.length, 0);
   history = r.time.map((t, k) => [k, t, r.status[k], 0, 0, 0, 0, 0, ...all.subarray(k * n, (k + 1) * n)]);

@@ -23,6 +23,34 @@ EXPLANATIONS = ["outputs", "believability", "faq", "opensim", "paths", "elastic-
                 "comparison", "architecture", "abi", "style", "glossary"]
 
 
+MARKER = re.compile(r"(?:[-*]|\d+\.) +")
+
+
+def four_spaces(text):
+    """The pages are written as most readers of Markdown take them: what belongs to an item of a list is indented by the width of
+    its marker, and a list may follow a line of text. The generator's wants four spaces a level, and a blank line before a list."""
+    said, levels, fenced, broken = [], [], False, False
+    for line in text.splitlines():
+        if line.startswith("```"):
+            fenced, levels = not fenced, []
+        elif not fenced and line.strip():
+            indent = len(line) - len(line.lstrip())
+            while levels and indent < levels[-1]:
+                levels.pop()
+            item = MARKER.match(line.lstrip()) if indent - (levels[-1] if levels else 0) < 4 else None
+            is_text = bool(said) and said[-1].strip() and not said[-1].startswith("```")
+            if item and is_text and (broken or not (levels or MARKER.match(said[-1].lstrip()) or said[-1].startswith(" "))):
+                said.append("")
+            line = " " * (4 * len(levels) + indent - (levels[-1] if levels else 0)) + line.lstrip()
+            if item:
+                levels.append(indent + len(item[0]))
+                broken = False
+        elif not fenced:
+            broken = bool(levels)  # a blank line within an item
+        said.append(line)
+    return "\n".join(said) + "\n"
+
+
 class Site:
     def __init__(self, source, work, programs):
         self.source, self.work, self.programs = Path(source).resolve(), Path(work).resolve(), Path(programs)
@@ -74,7 +102,7 @@ class Site:
             return f"{found[1]}[{found[2]}]({to})" if to is not None else found[2]
         text = self.notebook(origin, page) if origin.suffix == ".ipynb" else origin.read_text()
         text = text.replace("<!-- findings -->", findings.table(self.source)) if "<!-- findings -->" in text else text
-        parts = re.split(r"(```.*?```)", text, flags=re.S)
+        parts = re.split(r"(```.*?```)", four_spaces(text), flags=re.S)
         for i in range(0, len(parts), 2):
             parts[i] = re.sub(r"(!?)\[([^\]]*)\]\(([^)\s]+)\)", link, parts[i])
         return "".join(parts)

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* search.c: a step that must help, from any start: it lowers an exact penalty, the merit, or passes
- * a filter. */
+/* search.c: a step that must help, from any start: it lowers an exact penalty, the merit. */
 #include "rti.h"
 
 #include <float.h>
@@ -8,95 +7,51 @@
 #include <string.h>
 
 #define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
-#define LESS 1e-5          /* part of the gaps by which a point must be better than another */
-#define TUBE 3e-3          /* sum of the gaps of an interval, rad, rad/s, 1: still a motion */
 #define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
 #define MOST_DAMPING 1e9
 /* Part of the least residual so far that a step may leave, whatever its merit. */
 #define NEARER 0.5
 
-/* Along the step of the program. */
-typedef struct slopes {
-    double cost, merit;
-} slopes;
-
-/* ---- merit = cost + sum of penalty * |gap| ---- */
-
+/* merit = cost + sum of weight * |gap| */
 static double merit(const rti_solver *s, const rti_point *point) {
-    return point->cost +
-           (s->shape.n_p > 0 ? rti_weighted_gaps(s, point) : s->penalty * rti_gap_sum(s, point));
+    return point->cost + rti_weighted_gaps(s, point);
 }
 
-/* Each gap a penalty of its own, above its multiplier, that falls again by halves (Powell 1978): in
- * a problem of a thousand gaps of all kinds the largest multiplier of all would forbid every step
- * that bends. */
-static double raise_weights(rti_solver *s) {
+/* Each gap has a penalty of its own, above its multiplier, that falls again by halves (Powell 1978,
+ * doi:10.1007/BFb0067703). Multipliers of angles are a thousand times those of velocities and
+ * activations: by the largest of all a step that bends a velocity counts as a thousand times what
+ * it costs, and is refused down to its hundredth. Where bounds and dynamics contradict each other
+ * multipliers say nothing, and all gaps count alike. */
+static double raise_weights(rti_solver *s, int32_t alike) {
+    const double largest = RTI_PENALTY * rti_largest_multiplier(s);
+    s->penalty = 0;
     for (size_t i = 0; i < size_x(&s->shape); i++) {
-        const double least = 1.1 * fabs(s->qp.lambda[i]);
+        const double least = alike ? largest : 1.1 * fabs(s->qp.lambda[i]);
         s->weight[i] = fmax(least, 0.5 * (s->weight[i] + least));
+        s->penalty = fmax(s->penalty, s->weight[i]);
     }
     return rti_weighted_gaps(s, &s->here);
 }
 
-/* Raises the penalties above the multipliers first. */
-static slopes slopes_of(rti_solver *s) {
-    const double largest = rti_largest_multiplier(s);
-    slopes slope = {0, 0};
-    if (s->penalty < 1.1 * largest) {
-        s->penalty = RTI_PENALTY * largest;
-    }
+/* Slope of the merit function along the step; raises the weights above the multipliers first. */
+static double merit_slope(rti_solver *s, int32_t alike) {
+    double slope = 0;
     for (int32_t k = 0; k <= s->shape.N; k++) {
         const double *step = row_z(&s->shape, s->qp.w, k);
         for (int32_t i = 0; i < s->shape.n_z; i++) {
-            slope.cost += s->here.stages[k].g[i] * step[i];
+            slope += s->here.stages[k].g[i] * step[i];
         }
         for (int32_t i = 0; i < s->shape.n_p; i++) {
-            slope.cost += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
+            slope += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
         }
     }
-    const double gaps = s->shape.n_p > 0 ? raise_weights(s) : s->penalty * s->gap_sum;
-    slope.merit = fmin(slope.cost - gaps, 0);
-    return slope;
+    return fmin(slope - raise_weights(s, alike), 0);
 }
 
-static int32_t has_less_merit(const rti_solver *s, double length, const slopes *slope) {
+/* Is the trial point good enough after this length? Its merit must be known. */
+static int32_t is_better(const rti_solver *s, double length, double slope) {
     const double before = merit(s, &s->here);
-    return merit(s, &s->trial) <=
-           before + ARMIJO * length * slope->merit + 1e-12 * (1 + fabs(before));
-}
-
-/* ---- the filter ----
- * Long steps along curved constraints make gaps that outweigh what little cost they save, and the
- * merit cuts them to pieces. So a full step of a window is also taken where its cost or its gaps
- * are less than those of each point of this solve so far (Fletcher and Leyffer 2002,
- * doi:10.1007/s101070100244), within a tube about the motions of the model (Gould and Toint 2010,
- * doi:10.1007/s10107-008-0244-7). */
-
-static void remember(rti_filter *f, double gaps, double cost) {
-    f->gaps[f->n % RTI_REMEMBERED] = gaps;
-    f->cost[f->n % RTI_REMEMBERED] = cost;
-    f->n++;
-}
-
-static int32_t passes(const rti_filter *f, double gaps, double cost) {
-    int32_t good = 1;
-    for (int32_t i = 0; i < f->n && i < RTI_REMEMBERED; i++) {
-        good &= gaps <= (1 - LESS) * f->gaps[i] || cost <= f->cost[i] - LESS * f->gaps[i];
-    }
-    return good;
-}
-
-static int32_t is_new(const rti_solver *s, const slopes *slope) {
-    const double gaps = rti_gap_sum(s, &s->trial), cost = s->trial.cost;
-    const double least = ARMIJO * fmin(slope->cost, 0) - LESS * s->gap_sum;
-    return gaps <= fmax(s->gap_sum, TUBE * s->shape.N) && passes(&s->filter, gaps, cost) &&
-           (gaps <= (1 - LESS) * s->gap_sum || cost <= s->here.cost + least);
-}
-
-/* Is the trial point good enough after this length? Its cost and gaps must be known. */
-static int32_t is_better(const rti_solver *s, double length, const slopes *slope) {
-    return has_less_merit(s, length, slope) ||
-           (length == 1 && s->shape.n_p == 0 && is_new(s, slope));
+    return merit(s, &s->trial) <= before + ARMIJO * length * slope + 1e-12 * (1 + fabs(before));
 }
 
 /* What of a difference of merits means nothing: the part of the cost that the program, solved to
@@ -109,12 +64,12 @@ static double noise(const rti_solver *s) {
     return s->qp.open + 10 * DBL_EPSILON * (fabs(s->here.cost) + s->penalty * size);
 }
 
-/* Close to the solution there is less to gain than noise, and merit and filter are deaf. Is the
+/* Close to the solution there is less to gain than noise, and the merit function is deaf. Is the
  * trial point, with the multipliers of the program, then much nearer to the optimality conditions
  * than any point of this solve? As their residual is halved each time, such steps come to an end.
  */
-static int32_t is_nearer(rti_solver *s, const slopes *slope) {
-    if (-slope->merit > noise(s)) {
+static int32_t is_nearer(rti_solver *s, double slope) {
+    if (-slope > noise(s)) {
         return 0;
     }
     const rti_residuals r =
@@ -122,10 +77,37 @@ static int32_t is_nearer(rti_solver *s, const slopes *slope) {
     return rti_excess(&r) <= NEARER * s->least_excess;
 }
 
+/* The program's result is put aside, or is there again: what a step is made of. */
+static void keep_first(rti_solver *s) {
+    const size_t z = sizeof(double) * size_z(&s->shape), x = sizeof(double) * size_x(&s->shape);
+    const qp *q = &s->qp;
+    memcpy(s->first.w, q->w, z);
+    memcpy(s->first.z_lower, q->z_lower, z);
+    memcpy(s->first.z_upper, q->z_upper, z);
+    memcpy(s->first.lambda, q->lambda, x);
+    s->first.stationarity = q->stationarity;
+    s->first.feasibility = q->feasibility;
+    s->first.complementarity = q->complementarity;
+    s->first.open = q->open;
+}
+
+static void recall_first(rti_solver *s) {
+    const size_t z = sizeof(double) * size_z(&s->shape), x = sizeof(double) * size_x(&s->shape);
+    qp *q = &s->qp;
+    memcpy(q->w, s->first.w, z);
+    memcpy(q->z_lower, s->first.z_lower, z);
+    memcpy(q->z_upper, s->first.z_upper, z);
+    memcpy(q->lambda, s->first.lambda, x);
+    q->stationarity = s->first.stationarity;
+    q->feasibility = s->first.feasibility;
+    q->complementarity = s->first.complementarity;
+    q->open = s->first.open;
+}
+
 /* A second look at a full step that was refused: the program once more with the gaps that the step
  * left (second-order correction: Fletcher 1982; along curved constraints good steps are else
  * refused, the Maratos effect). The refused point's gaps are in trial. */
-static int32_t second_look(rti_solver *s, const slopes *slope) {
+static int32_t second_look(rti_solver *s, double slope) {
     const qp_shape *shape = &s->shape;
     const size_t bytes = sizeof(double) * (size_t)shape->n_x;
     for (int32_t k = 0; k < shape->N; k++) {
@@ -135,12 +117,10 @@ static int32_t second_look(rti_solver *s, const slopes *slope) {
             b[i] += s->trial.stages[k].b[i];
         }
     }
+    keep_first(s);
     const int32_t result = rti_program(s, 1);
     for (int32_t k = 0; k < shape->N; k++) {
         memcpy(s->here.stages[k].b, row_x(shape, s->gaps, k), bytes);
-    }
-    if (result == QP_LATE) {
-        return 0;
     }
     if (result == QP_SOLVED) {
         rti_reach(s, 1);
@@ -148,13 +128,13 @@ static int32_t second_look(rti_solver *s, const slopes *slope) {
             return 1;
         }
     }
-    (void)rti_program(s, 0); /* the first step again, to be shortened */
+    recall_first(s); /* to be shortened */
     return 0;
 }
 
 /* Shortens the step until the trial point is better; the length, 0: none found. The point is
  * then known with derivatives. */
-static double search(rti_solver *s, const slopes *slope) {
+static double search(rti_solver *s, double slope) {
     double length = 0.5;
     for (int32_t i = 0; i < RTI_HALVINGS; i++, length /= 2) {
         rti_reach(s, length);
@@ -179,16 +159,16 @@ static void adapt_damping(rti_solver *s, double length) {
 
 /* Tries the step of a solved program; the part of it that was gone, 0: none. */
 static double try_step(rti_solver *s, int32_t result) {
-    const slopes slope = slopes_of(s);
+    const double slope = merit_slope(s, result == QP_INFEASIBLE && s->shape.n_p == 0);
     rti_reach(s, 1);
     const int32_t known = rti_evaluate(s, &s->trial, RTI_ALL);
-    if (known && (is_better(s, 1, &slope) || is_nearer(s, &slope))) {
+    if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
         return 1;
     }
-    if (known && result == QP_SOLVED && !rti_is_over(s) && second_look(s, &slope)) {
+    if (known && result == QP_SOLVED && !rti_is_over(s) && second_look(s, slope)) {
         return 1;
     }
-    return s->failure == MHE_OK && !rti_is_over(s) ? search(s, &slope) : 0;
+    return s->failure == MHE_OK && !rti_is_over(s) ? search(s, slope) : 0;
 }
 
 int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
@@ -201,7 +181,6 @@ int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
         const double before = s->gap_sum;
         const double length = result == QP_FAILED ? 0 : try_step(s, result);
         if (length > 0) {
-            remember(&s->filter, s->gap_sum, s->here.cost);
             rti_accept(s, length);
             adapt_damping(s, length);
             const int32_t stays = rti_gap_sum(s, &s->here) > 0.9 * before;

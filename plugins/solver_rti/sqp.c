@@ -233,7 +233,6 @@ static void tell_progress(const rti_solver *s, const mhe_solve_control *control,
 static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t *iterations) {
     const int32_t limit = iteration_limit(s), near = is_near(s), real_time = is_real_time(s);
     s->penalty = s->damping = 0;
-    s->filter.n = 0;
     memset(s->weight, 0, sizeof(double) * size_x(&s->shape));
     s->least_excess = INFINITY;
     for (*iterations = 0;;) {

@@ -44,6 +44,7 @@ class Estimate(Mapping[str, _Array]):
     moment: _Array
     residual: _Array
     markers: _Array
+    reactions: _Array
     q_sd: _Array
     activation_sd: _Array
     force_sd: _Array
@@ -188,6 +189,7 @@ class Results:
     moment: pandas.DataFrame
     residual: pandas.DataFrame
     markers: pandas.DataFrame
+    reactions: pandas.DataFrame
     quality: pandas.DataFrame
     verdict: str
     findings: list[Finding]

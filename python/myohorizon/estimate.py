@@ -11,8 +11,12 @@ PHASE = ("empty", "filling", "beginning", "settling", "running")
 
 # Quantities of an estimate with their units, in the order of its numbers.
 UNITS = {"q": "rad (m)", "qdot": "rad/s (m/s)", "activation": "1", "excitation": "1", "force": "N",
-         "moment": "N m (N)", "residual": "N m (N)", "markers": "m",
+         "moment": "N m (N)", "residual": "N m (N)", "markers": "m", "reactions": "N, N m",
          "q_sd": "rad (m)", "activation_sd": "1", "force_sd": "N", "moment_sd": "N m (N)"}
+
+
+# Quantities of several numbers an entry: how many, and what a column's name ends with.
+PARTS = {"markers": (3, (".x", ".y", ".z")), "reactions": (6, ("_fx", "_fy", "_fz", "_mx", "_my", "_mz"))}
 
 
 class Shape:
@@ -22,6 +26,7 @@ class Shape:
         self.coordinates = names(info.coordinate_names, info.n_q)
         self.muscles = names(info.muscle_names, info.n_muscles)
         self.markers = names(info.marker_names, info.n_markers)
+        self.joints = names(info.joint_names, info.n_joints)
         n_q, n_m = info.n_q, info.n_muscles
         sizes = {"q": n_q, "qdot": n_q, "activation": n_m, "force": n_m, "moment": n_q}
         if info.formulation == lib.MHE_FORMULATION_EXCITATION:
@@ -30,13 +35,16 @@ class Shape:
             sizes["residual"] = info.n_residual_torques
         if info.n_markers > 0:
             sizes["markers"] = 3 * info.n_markers
+        if info.n_joints > 0:
+            sizes["reactions"] = 6 * info.n_joints
         if info.uncertainty:
             sizes.update(q_sd=n_q, activation_sd=n_m, force_sd=n_m, moment_sd=n_q)
         self.places = {}
         self.size = 0
         for name in UNITS:
             if name in sizes:
-                shape = (info.n_markers, 3) if name == "markers" else (sizes[name],)
+                parts = PARTS[name][0] if name in PARTS else 1
+                shape = (sizes[name] // parts, parts) if parts > 1 else (sizes[name],)
                 self.places[name] = (self.size, self.size + sizes[name], shape)
                 self.size += sizes[name]
         block = ffi.NULL
@@ -54,14 +62,14 @@ class Shape:
             raise KeyError(f"an estimate has no {name!r}; it has {', '.join(self.places)}")
         if name in ("q", "qdot", "moment", "q_sd", "moment_sd"):
             return self.coordinates
-        if name == "markers":
-            return self.markers
+        if name in PARTS:
+            return self.markers if name == "markers" else self.joints
         return self.residuals if name == "residual" else self.muscles
 
     def columns(self, name):
         """The same, a name a number: "DELT.x"."""
         labels = self.labels(name)
-        return tuple(f"{label}.{axis}" for label in labels for axis in "xyz") if name == "markers" else labels
+        return tuple(label + end for label in labels for end in PARTS[name][1]) if name in PARTS else labels
 
     def copier(self, estimate):
         """A function that copies the numbers of `estimate` to an address."""
@@ -88,6 +96,8 @@ class Estimate(Mapping):
     ``moment``      [n_coordinates]      N m     joint moments by the muscles (N)
     ``residual``    [n_residual]         N m     residual torques, where switched on (N)
     ``markers``     [n_markers, 3]       m       positions in the ground frame of the model
+    ``reactions``   [n_joints, 6]        N, N m  force and moment on the body that a joint carries, where ``output.reactions`` is
+                                                 on; NaN: none could be found
     ``q_sd`` ..                                  standard deviations of ``q``, ``activation``, ``force``, ``moment``, where
                                                  ``output.uncertainty`` is on
     ==============  ===================  ======  ==========================================================
@@ -142,7 +152,7 @@ class Estimate(Mapping):
         return PHASE[self._phase]
 
     def labels(self, name):
-        """Names of the entries of a quantity: coordinates, muscles or markers."""
+        """Names of the entries of a quantity: coordinates, muscles, markers or joints."""
         return self._shape.labels(name)
 
     def named(self, name):

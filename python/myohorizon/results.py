@@ -28,9 +28,9 @@ class Finding(NamedTuple):
 class Results:
     """What run() found.
 
-    `q`, `qdot`, `activation`, `excitation`, `force`, `moment`, `residual`, `markers` and `quality` are DataFrames of
+    `q`, `qdot`, `activation`, `excitation`, `force`, `moment`, `residual`, `markers`, `reactions` and `quality` are DataFrames of
     pandas, one row an estimate, indexed by time (s); `table(name)` gives the same as a Table without pandas, `xarray()`
-    all of them as a Dataset. Units: rad (m), rad/s (m/s), 1, 1, N, N m (N), N m (N), m. Columns of `quality`: status
+    all of them as a Dataset. Units: rad (m), rad/s (m/s), 1, 1, N, N m (N), N m (N), m, N and N m. Columns of `quality`: status
     (0 ok, 1 iteration limit, 2 deadline, 3 predicted, 4 restarted), iterations, kkt_residual, solve_time (s),
     marker_rms (m), emg_rms.
 
@@ -70,7 +70,7 @@ class Results:
         import xarray
         arrays = {}
         for name, table in self._tables.items():
-            of = {"q": "coordinate", "qdot": "coordinate", "moment": "coordinate", "residual": "residual_torque",
+            of = {"q": "coordinate", "qdot": "coordinate", "moment": "coordinate", "residual": "residual_torque", "reactions": "component",
                   "quality": "number"}.get(name, "muscle")
             array = table.xarray()
             arrays[name] = array if table.is_markers else array.rename(column=of)

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 import pytest
-from support import BUILD, DEMO, FAST, SOURCE, demo_frames
+from support import BUILD, DEMO, FAST, SOURCE, demo_frames, short_demo
 
 import myohorizon
 from myohorizon._library import path as library_path
@@ -53,6 +53,22 @@ def test_standard_deviations_come_where_they_are_asked_for():
     assert sure[-1].force_sd.shape == (19,) and (sure[-1].force_sd > 0).all()
     assert sure[-1].q_sd.shape == (4,) and np.isfinite(sure[-1].moment_sd).all()
     assert sure[-1].labels("activation_sd") == sure[-1].labels("force")
+
+
+def test_reactions_come_where_they_are_asked_for(tmp_path):
+    """Those that mhe-run writes."""
+    frames = demo_frames(40)
+    last = estimates(frames, **{"output.reactions": "child"})[-1]
+    assert last.reactions.shape == (len(last.labels("reactions")), 6) and np.abs(last.reactions).max() > 1
+    keys = short_demo(tmp_path, 40)
+    results = myohorizon.run(DEMO, **FAST, **keys, output__reactions="child")
+    table = results.table("reactions")
+    assert table.columns[0].endswith("_fx") and np.array_equal(table.values[len(table) - 1], last.reactions.ravel())
+    words = [word for key, value in {**FAST, **keys, "output.reactions": "child", "output.picture": "false"}.items()
+             for word in ("--set", f"{key}={value}")]
+    subprocess.run([BUILD / "bin/mhe-run", DEMO, "--out", tmp_path / "out", "--quiet", *words], check=True, capture_output=True)
+    written = myohorizon.read_sto(tmp_path / "out/reactions.sto")
+    assert written.columns == table.columns and np.allclose(written.values, table.values, rtol=1e-11, atol=0)
 
 
 def test_the_bits_are_those_of_c(tmp_path):

@@ -54,7 +54,7 @@ def test_the_fields_of_the_stubs_are_those_of_the_code():
     slots = {name for name in myohorizon.Estimate.__slots__ if not name.startswith("_")}
     assert fields(classes["Estimate"]) == quantities | slots | {"units"}
     results = myohorizon.run(DEMO, **FAST)
-    with_residuals = {*results._tables, "residual"}
+    with_residuals = {*results._tables, "residual", "reactions"}
     assert fields(classes["Results"]) == with_residuals | {name for name in vars(results) if not name.startswith("_")}
     assert fields(classes["Table"]) == set(vars(results.table("q")))
     for name, node in classes.items():  # the docstring names each of them, and nothing else

@@ -88,6 +88,21 @@ wait $pid
 "$run" arm.yaml --batch many.csv --out m --quiet --set solver.plugin=mhe.solver.ipopt > out.txt 2>&1 || fail "goes on: $(cat out.txt)"
 grep -q '[1-7] of 8 trials are there already' out.txt && grep -q '8 usable' out.txt || fail "goes on: $(cat out.txt)"
 
+# Killed with no chance to say so: the same.
+"$run" arm.yaml --batch many.csv --out k --quiet --workers 1 --set solver.plugin=mhe.solver.ipopt > /dev/null 2>&1 &
+pid=$!
+for _ in $(seq 1 600); do
+    [ -s k/t1/batch.txt ] && break
+    sleep 0.1
+done
+kill -9 $pid
+wait $pid 2> /dev/null
+"$run" arm.yaml --batch many.csv --out k --quiet --set solver.plugin=mhe.solver.ipopt > out.txt 2>&1 || fail "after kill -9: $(cat out.txt)"
+grep -q '[1-7] of 8 trials are there already' out.txt && grep -q '8 usable' out.txt || fail "after kill -9: $(cat out.txt)"
+for i in 1 2 3 4 5 6 7 8; do
+    cmp -s m/t1/forces.sto k/t$i/forces.sto || fail "after kill -9: the forces of t$i differ"
+done
+
 # refused STATUS TEXT WORDS...: what is wrong is said before anything is estimated
 refused() {
     status=$1 text=$2

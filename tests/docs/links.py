@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No link of the built site leads nowhere: pages and their anchors are there; what leads outside is on a list.
+"""No link of the built site leads nowhere: pages and their anchors are there; what leads outside is on a list. No list, fence or
+remark of a page's source is seen as text.
 
     links.py HTML_DIR LIST
 
@@ -41,6 +42,15 @@ def listed(path):
     return found
 
 
+def seen_as_text(path):
+    """Pieces of Markdown that were not taken as what they are."""
+    text = path.read_text()
+    prose = re.sub(r"<(pre|code|script)\b.*?</\1>", "", text, flags=re.S)
+    for paragraph in re.findall(r"<p>((?:(?!</p>).)*)</p>", prose, re.S):
+        yield from re.findall(r"^\s*(?:[-*]|\d+\.|\|) .{0,40}", paragraph, re.M)[:1] if "\n" in paragraph else []
+    yield from re.findall(r"```|&lt;!-- .{0,30}", prose)
+
+
 def wrong_address(address):
     parts = urllib.parse.urlsplit(address)
     if parts.scheme not in ("http", "https", "mailto") or not (parts.netloc or parts.scheme == "mailto"):
@@ -56,6 +66,7 @@ def main():
     pages = {path: Page(path) for path in sorted(root.rglob("*.html"))}
     known, used, wrong = listed(Path(sys.argv[2])), set(), []
     for path, page in pages.items():
+        wrong += [f"{path.relative_to(root)}: is seen as text: {piece}" for piece in seen_as_text(path)]
         for link in page.links:
             name = path.relative_to(root)
             if re.match(r"[a-z][a-z0-9+.-]*:", link, re.I):

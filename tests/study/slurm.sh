@@ -1,6 +1,6 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# A study on a real Slurm: controller, node and authentication of its own, started here with a folder and ports of their
+# A study, and a session's trials, on a real Slurm: controller, node and authentication of its own, started here with a folder and ports of their
 # own; a node that dies with its task, whose task is queued again; the results are those of a run without Slurm.
 #   slurm.sh PATH/mhe-study SOURCE_DIR
 set -u
@@ -16,7 +16,6 @@ for program in munged slurmctld slurmd sbatch squeue scontrol; do
 done
 . "$source/tests/support/script.sh"
 chmod 755 "$work"
-. "$source/tests/study/small.sh"
 pids=()
 # Ends what was started here, and nothing else.
 end_all() {
@@ -90,11 +89,27 @@ until_true 30 node_is_idle || skip "slurmd does not start: $(tail -n 1 slurmd.lo
 
 # ---- the study ----
 
-write_study 8 > small.yaml
-"$study" run small.yaml --out calm --quiet > out.txt 2> err.txt || fail "without Slurm: $(cat err.txt)"
-"$study" submit small.yaml --engine slurmm 2> err.txt && fail "an engine that is not known"
+# Trials from the third of each condition on wait for a gate, so that there are some to be done when the node dies.
+cat > trial.sh << END_OF_PROGRAM
+#!/bin/sh
+while [ "\$4" -gt 1 ] && [ ! -e "$work/gate" ]; do sleep 0.1; done
+echo converged 1
+echo force_n "\$6"
+END_OF_PROGRAM
+chmod +x trial.sh
+cat > small.yaml << END_OF_STUDY
+config: $source/models/arm19/studies/estimate.yaml
+program: trial.sh
+trials: 4
+factors: {amount: {values: [little, much]}}
+grids: [{amount: [little, much]}]
+END_OF_STUDY
+touch gate
+"$study" run small.yaml --trust --out calm --quiet > out.txt 2> err.txt || fail "without Slurm: $(cat err.txt)"
+rm gate
+"$study" submit small.yaml --trust --engine slurmm 2> err.txt && fail "an engine that is not known"
 grep -q "did you mean 'slurm'" err.txt || fail "an engine that is not known: $(cat err.txt)"
-"$study" submit small.yaml --engine slurm --out cluster --tasks 2 --option --time=20 > out.txt 2> err.txt ||
+"$study" submit small.yaml --trust --engine slurm --out cluster --tasks 2 --option --time=20 > out.txt 2> err.txt ||
     fail "submit: $(cat err.txt)"
 cat out.txt
 job=$(sed -n 's/^job \([0-9]*\):.*/\1/p' out.txt)
@@ -117,6 +132,7 @@ kill -9 "$node" "${victims[@]}"
 { wait "$node"; } 2> /dev/null
 killed=$(cat cluster/rows/*.rows | wc -l)
 [ -e cluster/results.csv ] && fail "it was over before it was killed"
+touch gate
 scontrol update nodename="$host" state=down reason=test || fail "the node cannot be set down"
 requeued() { squeue -h -j "$job" -o '%T' | grep -q PENDING; }
 until_true 30 requeued || fail "the tasks are not queued again: $(squeue -j "$job")"
@@ -136,5 +152,22 @@ grep -q 'trials are there already' cluster/slurm/*.log || fail "a requeued task 
 cp cluster/results.csv before.csv
 "$study" merge cluster > out.txt 2> err.txt || fail "merge: $(cat err.txt)"
 cmp before.csv cluster/results.csv || fail "merging changes the results"
+
+# ---- a session's trials: mhe-run --batch ----
+
+run=$(dirname "$study")/mhe-run demo=$source/models/arm19/demo.yaml
+printf 'name,horizon.window\nfive,5\nsix,6\nseven,7\n' > trials.csv
+keys=(--set output.picture=false --set solver.plugin=mhe.solver.rti)
+"$run" "$demo" --batch trials.csv --out here --quiet "${keys[@]}" > out.txt 2>&1 || fail "batch without Slurm: $(cat out.txt)"
+"$run" "$demo" --batch trials.csv --out there "${keys[@]}" --engine slurm --tasks 2 --option --time=20 > out.txt 2>&1 ||
+    fail "batch: $(cat out.txt)"
+job=$(sed -n 's/.*job \([0-9]*\):.*/\1/p' out.txt)
+[ -n "$job" ] || fail "no job: $(cat out.txt)"
+until_true 240 ended || fail "the job does not end: $(squeue -j "$job")"
+all_there() { [ "$(grep -c ',yes,' there/batch.csv)" -eq 3 ] && [ -s there/batch.html ]; }
+until_true 20 all_there || fail "no table of three: $(cat there/batch.csv there/slurm/*.log)"
+for trial in five six seven; do
+    cmp "here/$trial/forces.sto" "there/$trial/forces.sto" || fail "the results are not those of a run without Slurm"
+done
 
 finish "slurm"

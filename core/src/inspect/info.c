@@ -11,6 +11,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 const char *const mhi_info_obstacles[4] = {"sphere", "cylinder", "ellipsoid", "torus"};
 
@@ -120,14 +121,29 @@ static void add_forces(mhi_text *out, const mhe_description *d) {
                   {"coordinate limits", d->n_limits},
                   {"bushings", d->n_bushings},
                   {"actuators", d->n_actuators},
-                  {"loops", d->n_loops},
-                  {"markers", d->n_markers}};
+                  {"loops", d->n_loops}};
     mhi_text_add(out, "\n");
     for (size_t i = 0; i < sizeof forces / sizeof *forces; i++) {
         if (forces[i].n > 0) {
             mhi_text_add(out, "%s: %d\n", forces[i].what, (int)forces[i].n);
         }
     }
+}
+
+/* By name: a recording's labels have to be these. */
+static void add_markers(mhi_text *out, const mhe_description *d) {
+    size_t width = 0;
+    if (d->n_markers > 0) {
+        mhi_text_add(out, "\nmarkers: %d\n", (int)d->n_markers);
+    }
+    for (int32_t i = 0; i < d->n_markers; i++) {
+        const char *name = d->markers[i].name;
+        const char *before = i == 0 ? "  " : width + strlen(name) > 96 ? ",\n  " : ", ";
+        width = before[0] == ' ' || before[1] == '\n' ? 0 : width;
+        width += strlen(name) + 2;
+        mhi_text_add(out, "%s%s", before, name);
+    }
+    mhi_text_add(out, "%s", d->n_markers > 0 ? "\n" : "");
 }
 
 /* Paths whose lengths may jump. */
@@ -166,6 +182,7 @@ static mhe_status add_all(mhi_text *out, const mhe_description *d, mhe_error *er
     mhe_status status = add_muscles(out, d, err);
     add_forces(out, d);
     add_jumping(out, d);
+    add_markers(out, d);
     add_lines(out, "not supported", d->unsupported, d->n_unsupported);
     add_lines(out, "left out, of no effect here", d->dropped, d->n_dropped);
     add_lines(out, "warnings", d->warnings, d->n_warnings);
