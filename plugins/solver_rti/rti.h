@@ -72,19 +72,19 @@ typedef struct rti_solver {
     double *spread;                     /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
     double *gain, *rest, *joint;        /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
     rti_pool *pool;
-    rti_worker *workers;      /* [n_workers of the problem] */
-    double *stage_cost;       /* [N+1] of the last evaluation, not scaled */
-    mhe_status *stage_status; /* [N+1] */
-    double scale;             /* of the objective; 0 before the first solve */
-    double penalty;           /* of the gaps in the merit function; this solve's */
-    double *weight;           /* [size_x] of each gap in it; 1 unless there are parameters */
-    double damping;           /* Levenberg's, of the next step */
-    int32_t warm;             /* the multipliers are worth a start */
-    double gap_sum;           /* at `here` */
-    rti_residuals residuals;  /* at the last linearisation */
-    double least_excess;      /* of the points of this solve, see rti_excess() */
-    rti_leap leap;            /* of the last step, if a real-time iteration ended with it */
-    double deadline;          /* this solve's; infinity: none */
+    rti_worker *workers;              /* [n_workers of the problem] */
+    double *stage_cost;               /* [N+1] of the last evaluation, not scaled */
+    mhe_status *stage_status;         /* [N+1] */
+    double scale;                     /* of the objective; 0 before the first solve */
+    double *weight;                   /* [size_x] of each gap in the merit function; this solve's */
+    double penalty;                   /* the largest of them */
+    double damping;                   /* Levenberg's, of the next step */
+    int32_t warm;                     /* the multipliers are worth a start */
+    double gap_sum;                   /* at `here` */
+    rti_residuals residuals;          /* at the last linearisation */
+    double least_excess;              /* of the points of this solve, see rti_excess() */
+    rti_leap leap;                    /* of the last step, if a real-time iteration ended with it */
+    double deadline;                  /* this solve's; infinity: none */
     const mhe_solve_control *control; /* this solve's, or NULL */
     double iteration_time;            /* s, of this solve's last iteration */
     double seconds;                   /* spent in evaluate() */
@@ -111,7 +111,7 @@ void rti_rescale(rti_solver *s, rti_point *point, double factor);
 /* Puts Levenberg's term damping/2 |step|^2 on the Hessians in the place of the present one. */
 void rti_set_damping(rti_solver *s, rti_point *point, double damping);
 double rti_gap_sum(const rti_solver *s, const rti_point *point);
-/* The same with s->weight. */
+/* The same, each gap times its s->weight. */
 double rti_weighted_gaps(const rti_solver *s, const rti_point *point);
 /* Residuals at a point with these multipliers; overwrites s->slope. */
 rti_residuals rti_residuals_of(rti_solver *s, const rti_point *point, const double *lambda,

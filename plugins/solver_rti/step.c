@@ -277,31 +277,29 @@ int32_t rti_step_full(rti_solver *s) {
     return RTI_STUCK;
 }
 
-/* ---- globalised by an exact penalty: merit = cost + penalty * sum |gap| ---- */
+/* ---- globalised by an exact penalty: merit = cost + sum weight |gap| ---- */
 
 static double merit(const rti_solver *s, const rti_point *point) {
-    return point->cost +
-           (s->shape.n_p > 0 ? rti_weighted_gaps(s, point) : s->penalty * rti_gap_sum(s, point));
+    return point->cost + rti_weighted_gaps(s, point);
 }
 
-/* Each gap a penalty of its own, above its multiplier, that falls again by halves (Powell 1978): in
- * a problem of a thousand gaps of all kinds the largest multiplier of all would forbid every step
- * that bends. */
+/* Each gap has a penalty of its own, above its multiplier, that falls again by halves (Powell 1978,
+ * doi:10.1007/BFb0067703). Multipliers of angles are a thousand times those of velocities and
+ * activations: by the largest of all a step that bends a velocity counts as a thousand times what
+ * it costs, and is refused down to its hundredth. */
 static double raise_weights(rti_solver *s) {
+    s->penalty = 0;
     for (size_t i = 0; i < size_x(&s->shape); i++) {
         const double least = 1.1 * fabs(s->qp.lambda[i]);
         s->weight[i] = fmax(least, 0.5 * (s->weight[i] + least));
+        s->penalty = fmax(s->penalty, s->weight[i]);
     }
     return rti_weighted_gaps(s, &s->here);
 }
 
-/* Slope of the merit function along the step; raises the penalty above the multipliers first. */
+/* Slope of the merit function along the step; raises the weights above the multipliers first. */
 static double merit_slope(rti_solver *s) {
-    const double largest = largest_multiplier(s);
     double slope = 0;
-    if (s->penalty < 1.1 * largest) {
-        s->penalty = PENALTY * largest;
-    }
     for (int32_t k = 0; k <= s->shape.N; k++) {
         const double *step = row_z(&s->shape, s->qp.w, k);
         for (int32_t i = 0; i < s->shape.n_z; i++) {
@@ -311,8 +309,7 @@ static double merit_slope(rti_solver *s) {
             slope += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
         }
     }
-    const double gaps = s->shape.n_p > 0 ? raise_weights(s) : s->penalty * s->gap_sum;
-    return fmin(slope - gaps, 0);
+    return fmin(slope - raise_weights(s), 0);
 }
 
 /* Is the trial point good enough after this length? Its merit must be known. */
