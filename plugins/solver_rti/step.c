@@ -286,11 +286,13 @@ static double merit(const rti_solver *s, const rti_point *point) {
 /* Each gap has a penalty of its own, above its multiplier, that falls again by halves (Powell 1978,
  * doi:10.1007/BFb0067703). Multipliers of angles are a thousand times those of velocities and
  * activations: by the largest of all a step that bends a velocity counts as a thousand times what
- * it costs, and is refused down to its hundredth. */
-static double raise_weights(rti_solver *s) {
+ * it costs, and is refused down to its hundredth. Where bounds and dynamics contradict each other
+ * multipliers say nothing, and all gaps count alike. */
+static double raise_weights(rti_solver *s, int32_t alike) {
+    const double largest = PENALTY * largest_multiplier(s);
     s->penalty = 0;
     for (size_t i = 0; i < size_x(&s->shape); i++) {
-        const double least = 1.1 * fabs(s->qp.lambda[i]);
+        const double least = alike ? largest : 1.1 * fabs(s->qp.lambda[i]);
         s->weight[i] = fmax(least, 0.5 * (s->weight[i] + least));
         s->penalty = fmax(s->penalty, s->weight[i]);
     }
@@ -298,7 +300,7 @@ static double raise_weights(rti_solver *s) {
 }
 
 /* Slope of the merit function along the step; raises the weights above the multipliers first. */
-static double merit_slope(rti_solver *s) {
+static double merit_slope(rti_solver *s, int32_t alike) {
     double slope = 0;
     for (int32_t k = 0; k <= s->shape.N; k++) {
         const double *step = row_z(&s->shape, s->qp.w, k);
@@ -309,7 +311,7 @@ static double merit_slope(rti_solver *s) {
             slope += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
         }
     }
-    return fmin(slope - raise_weights(s), 0);
+    return fmin(slope - raise_weights(s, alike), 0);
 }
 
 /* Is the trial point good enough after this length? Its merit must be known. */
@@ -398,7 +400,7 @@ static void adapt_damping(rti_solver *s, double length) {
 
 /* Tries the step of a solved program; the part of it that was gone, 0: none. */
 static double try_step(rti_solver *s, int32_t result) {
-    const double slope = merit_slope(s);
+    const double slope = merit_slope(s, result == QP_INFEASIBLE && s->shape.n_p == 0);
     reach(s, 1);
     const int32_t known = rti_evaluate(s, &s->trial, RTI_ALL);
     if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
