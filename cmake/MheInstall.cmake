@@ -20,6 +20,9 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR
 # behind the core; who links the test kit statically needs those too.
 install(TARGETS mhe_plugin mhe_library EXPORT mhePluginTargets
     LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT libmhe0 NAMELINK_COMPONENT dev)
+if(MHE_PACKAGES)
+    install(TARGETS mhe_library LIBRARY DESTINATION ${MHE_OWN_LIBRARY_DIR} NAMELINK_SKIP)
+endif()
 install(TARGETS mhe_base mhe_core EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 if(TARGET mhe_testkit)
     install(TARGETS mhe_testkit EXPORT mheTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)

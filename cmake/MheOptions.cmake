@@ -6,7 +6,20 @@ option(MHE_FUZZ "Build the fuzz targets (clang with libFuzzer)" OFF)
 set(MHE_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize= (address,undefined or thread)")
 
 set(MHE_PLUGIN_ABI_DIR mhe/plugins/abi0)
+# Debian's packages: the programs' own package needs no other, so it has the library beside its plugins, and libmhe0 the
+# one that other programs link with.
+option(MHE_PACKAGES "Programs, Python and Octave use a libmhe.so of their own, LIBDIR/mhe, besides the one in LIBDIR" OFF)
+set(MHE_OWN_LIBRARY_DIR ${CMAKE_INSTALL_LIBDIR})
+if(MHE_PACKAGES)
+    set(MHE_OWN_LIBRARY_DIR ${CMAKE_INSTALL_LIBDIR}/mhe)
+endif()
 set(MHE_PLUGIN_BUILD_DIR ${CMAKE_BINARY_DIR}/plugins)
+
+# mhe_finds_library(<target> <folder>): installed in the folder, it finds libmhe.so, wherever the whole was moved to.
+function(mhe_finds_library target folder)
+    file(RELATIVE_PATH there ${CMAKE_INSTALL_PREFIX}/${folder} ${CMAKE_INSTALL_PREFIX}/${MHE_OWN_LIBRARY_DIR})
+    set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN/${there}")
+endfunction()
 
 # Flags of everything compiled here; interface only, never installed.
 add_library(mhe_flags INTERFACE)

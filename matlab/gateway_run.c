@@ -2,10 +2,11 @@
 /* A whole recording, as mhe-run estimates it. */
 #include "gateway.h"
 
-#include <mhe/estimator.h>
 #include <mhe/findings.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define RUN_ROWS 10 /* quantities that are kept of every estimate */
 
 typedef struct run {
     mhe_config *config;
@@ -15,23 +16,35 @@ typedef struct run {
     mhe_estimator_info info;
     mhe_recording_info data;
     int32_t n, weight;
-    double *rows[8]; /* time, then what `widths` says, estimate after estimate */
+    double *rows[RUN_ROWS]; /* what `run_names` says, estimate after estimate */
     char *text;
     mhe_rmse rmse;
 } run;
 
-static const char *const run_names[8] = {"time",       "q",     "qdot",   "activation",
-                                         "excitation", "force", "moment", "markers"};
+static const char *const run_names[RUN_ROWS] = {"time",       "q",      "qdot",   "activation",
+                                                "excitation", "force",  "moment", "residual",
+                                                "markers",    "quality"};
+static const char *const quality_names[] = {"status",     "iterations", "kkt_residual",
+                                            "solve_time", "marker_rms", "emg_rms"};
+#define RUN_QUALITY ((int32_t)(sizeof quality_names / sizeof quality_names[0]))
 
 static int32_t run_width(const run *r, int k) {
     const int32_t n_m = r->info.n_muscles, n_q = r->info.n_q;
-    const int32_t widths[8] = {
-        1, n_q, n_q, n_m, r->info.formulation == 0 ? n_m : 0, n_m, n_q, 3 * r->info.n_markers};
+    const int32_t widths[RUN_ROWS] = {1,
+                                      n_q,
+                                      n_q,
+                                      n_m,
+                                      r->info.formulation == 0 ? n_m : 0,
+                                      n_m,
+                                      n_q,
+                                      r->info.n_residual_torques,
+                                      3 * r->info.n_markers,
+                                      RUN_QUALITY};
     return widths[k];
 }
 
 static void run_close(run *r) {
-    for (int k = 0; k < 8; k++) {
+    for (int k = 0; k < RUN_ROWS; k++) {
         free(r->rows[k]);
     }
     mhe_free(r->text);
@@ -41,11 +54,12 @@ static void run_close(run *r) {
     mhe_config_close(r->config);
 }
 
-static mhe_status run_open(run *r, const char *path, const char **sets, int32_t n, mhe_error *err) {
+static mhe_status run_open(run *r, int nrhs, const mxArray *prhs[], mhe_error *err) {
     mhe_truth truth = {.size = sizeof truth};
+    memset(r, 0, sizeof *r);
     r->info.size = sizeof r->info;
     r->data.size = sizeof r->data;
-    mhe_status status = mhe_config_read(path, sets, n, 0, &gateway_host, &r->config, err);
+    mhe_status status = gateway_config_of(nrhs, prhs, &r->config, err);
     status = status == MHE_OK ? mhe_estimator_create(r->config, &r->estimator, err) : status;
     status = status == MHE_OK ? mhe_estimator_describe(r->estimator, &r->info) : status;
     status = status == MHE_OK ? mhe_recording_open(r->config, &r->recording, err) : status;
@@ -62,7 +76,7 @@ static mhe_status run_open(run *r, const char *path, const char **sets, int32_t 
     if (status == MHE_OK) {
         status = mhe_findings_open(r->config, r->estimator, r->recording, &r->findings, err);
     }
-    for (int k = 0; k < 8 && status == MHE_OK; k++) {
+    for (int k = 0; k < RUN_ROWS && status == MHE_OK; k++) {
         r->rows[k] =
             malloc(sizeof(double) * ((size_t)run_width(r, k) * (size_t)r->data.n_frames + 1));
         status = r->rows[k] == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
@@ -71,9 +85,12 @@ static mhe_status run_open(run *r, const char *path, const char **sets, int32_t 
 }
 
 static void run_keep(run *r, const mhe_estimate *e) {
-    const double *const values[8] = {&e->time,      e->q,     e->qdot,   e->activation,
-                                     e->excitation, e->force, e->moment, e->markers};
-    for (int k = 0; k < 8; k++) {
+    const double quality[] = {e->status,     e->iterations, e->kkt_residual,
+                              e->solve_time, e->marker_rms, e->emg_rms};
+    const double *const values[RUN_ROWS] = {&e->time,      e->q,     e->qdot,   e->activation,
+                                            e->excitation, e->force, e->moment, e->residual,
+                                            e->markers,    quality};
+    for (int k = 0; k < RUN_ROWS; k++) {
         const size_t width = (size_t)run_width(r, k);
         if (width > 0) {
             memcpy(r->rows[k] + width * (size_t)r->n, values[k], sizeof(double) * width);
@@ -111,39 +128,79 @@ static mhe_status run_all(run *r, mhe_error *err) {
     return status;
 }
 
-static mxArray *run_out(const run *r) {
+/* What a run's findings say: verdict, findings with weight, text and remedy. */
+static void add_findings(mxArray *out, const run *r) {
     static const char *const verdicts[] = {"yes", "doubtful", "no"};
-    mxArray *out = mxCreateStructMatrix(1, 1, 0, NULL);
-    for (int k = 0; k < 8; k++) {
+    static const char *const weights[] = {"note", "doubtful", "useless"};
+    static const char *fields[] = {"weight", "text", "remedy"};
+    mhe_finding finding = {.size = sizeof finding};
+    mwSize n = 0;
+    while (mhe_findings_at(r->findings, (int32_t)n, &finding, NULL) == MHE_OK) {
+        n++;
+    }
+    mxArray *found = mxCreateStructMatrix(n, 1, 3, fields);
+    for (mwIndex i = 0; i < n; i++) {
+        (void)mhe_findings_at(r->findings, (int32_t)i, &finding, NULL);
+        const char *remedy = finding.remedy == NULL ? "" : finding.remedy;
+        mxSetFieldByNumber(found, i, 0, mxCreateString(weights[finding.weight]));
+        mxSetFieldByNumber(found, i, 1, mxCreateString(finding.text));
+        mxSetFieldByNumber(found, i, 2, mxCreateString(remedy));
+    }
+    gateway_add(out, "verdict", mxCreateString(verdicts[r->weight]));
+    gateway_add(out, "findings", found);
+}
+
+static mxArray *run_out(run *r) {
+    mhe_error err = {0};
+    char *config = NULL;
+    mxArray *out = gateway_struct();
+    for (int k = 0; k < RUN_ROWS; k++) {
         gateway_add(out, run_names[k], gateway_matrix_out(r->rows[k], r->n, run_width(r, k)));
     }
-    gateway_add(out, "coordinate_names", gateway_names_out(r->info.coordinate_names, r->info.n_q));
-    gateway_add(out, "muscle_names", gateway_names_out(r->info.muscle_names, r->info.n_muscles));
-    gateway_add(out, "marker_names", gateway_names_out(r->info.marker_names, r->info.n_markers));
-    gateway_add(out, "verdict", mxCreateString(verdicts[r->weight]));
+    gateway_add_names(out, &r->info);
+    gateway_add(out, "quality_names", gateway_names_out(quality_names, RUN_QUALITY));
+    add_findings(out, r);
     gateway_add(out, "text", mxCreateString(r->text));
+    gateway_add(out, "name", mxCreateString(mhe_config_name(r->config)));
+    gateway_add(out, "dropped", gateway_dropped_out(r->config));
+    if (mhe_config_write(r->config, &config, &err) == MHE_OK) {
+        gateway_add(out, "config", gateway_text_out(MHE_OK, config, &err));
+    }
+    mxArray *rmse = gateway_struct();
     if (r->data.has_reference) {
-        mxArray *rmse = mxCreateStructMatrix(1, 1, 0, NULL);
         gateway_add_number(rmse, "q", r->rmse.q);
         gateway_add_number(rmse, "qdot", r->rmse.qdot);
         gateway_add_number(rmse, "activation", r->rmse.activation);
+        gateway_add_number(rmse, "excitation", r->rmse.excitation);
         gateway_add_number(rmse, "force", r->rmse.force);
         gateway_add_number(rmse, "marker", r->rmse.marker);
-        gateway_add(out, "rmse", rmse);
     }
+    gateway_add(out, "rmse", rmse);
     return out;
 }
 
 mxArray *gateway_run_recording(int nrhs, const mxArray *prhs[]) {
     mhe_error err = {0};
-    int32_t n = 0;
-    char *path = gateway_text_of(gateway_argument(nrhs, prhs, 1), "config");
-    const char **sets = gateway_sets_of(gateway_argument(nrhs, prhs, 2), &n);
     run r;
-    memset(&r, 0, sizeof r);
-    mhe_status status = run_open(&r, path, sets, n, &err);
+    mhe_status status = run_open(&r, nrhs, prhs, &err);
     status = status == MHE_OK ? run_all(&r, &err) : status;
     mxArray *out = status == MHE_OK ? run_out(&r) : NULL;
+    run_close(&r);
+    if (status != MHE_OK) {
+        gateway_refuse(status, &err);
+    }
+    return out;
+}
+
+mxArray *gateway_check_config(int nrhs, const mxArray *prhs[]) {
+    mhe_error err = {0};
+    run r;
+    mhe_status status = run_open(&r, nrhs, prhs, &err);
+    status = status == MHE_OK ? mhe_findings_judge(r.findings, &r.weight, &err) : status;
+    mxArray *out = status == MHE_OK ? gateway_struct() : NULL;
+    if (out != NULL) {
+        add_findings(out, &r);
+    }
     run_close(&r);
     if (status != MHE_OK) {
         gateway_refuse(status, &err);

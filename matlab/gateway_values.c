@@ -39,6 +39,10 @@ char *gateway_text_of(const mxArray *value, const char *name) {
     return text;
 }
 
+char *gateway_optional_text_of(const mxArray *value, const char *name) {
+    return value == NULL || mxIsEmpty(value) ? NULL : gateway_text_of(value, name);
+}
+
 const mxArray *gateway_argument(int nrhs, const mxArray *prhs[], int i) {
     return i < nrhs ? prhs[i] : NULL;
 }
@@ -49,6 +53,14 @@ double gateway_number_of(const mxArray *value, const char *name) {
         mexErrMsgIdAndTxt("myohorizon:argument", "%s: a number is needed", name);
     }
     return mxGetScalar(value);
+}
+
+int32_t gateway_count_of(const mxArray *value, const char *name) {
+    const double number = gateway_number_of(value, name);
+    if (!(number >= -2147483648.0 && number <= 2147483647.0) || number != (double)(int32_t)number) {
+        mexErrMsgIdAndTxt("myohorizon:argument", "%s: a whole number is needed", name);
+    }
+    return (int32_t)number;
 }
 
 const double *gateway_matrix_of(const mxArray *value, const char *name, int32_t rows,
@@ -71,23 +83,83 @@ const double *gateway_matrix_of(const mxArray *value, const char *name, int32_t 
     return mxGetPr(value);
 }
 
-const char **gateway_sets_of(const mxArray *value, int32_t *n) {
+const char **gateway_texts_of(const mxArray *value, const char *name, int32_t *n) {
     *n = 0;
     if (value == NULL || mxIsEmpty(value)) {
         return NULL;
     }
     if (!mxIsCell(value)) {
-        mexErrMsgIdAndTxt("myohorizon:argument", "assignments: a cell array of texts is needed");
+        mexErrMsgIdAndTxt("myohorizon:argument", "%s: a cell array of texts is needed", name);
     }
     *n = (int32_t)mxGetNumberOfElements(value);
-    const char **sets = mxMalloc(sizeof *sets * (size_t)*n);
+    const char **texts = mxMalloc(sizeof *texts * (size_t)*n);
     for (int32_t i = 0; i < *n; i++) {
-        sets[i] = gateway_text_of(mxGetCell(value, (mwIndex)i), "assignments");
+        texts[i] = gateway_text_of(mxGetCell(value, (mwIndex)i), name);
     }
-    return sets;
+    return texts;
+}
+
+mhe_status gateway_config_of(int nrhs, const mxArray *prhs[], mhe_config **config, mhe_error *err) {
+    int32_t n = 0;
+    const char *text = gateway_text_of(gateway_argument(nrhs, prhs, 1), "config");
+    const char **sets = gateway_texts_of(gateway_argument(nrhs, prhs, 2), "assignments", &n);
+    const char *folder = gateway_optional_text_of(gateway_argument(nrhs, prhs, 3), "folder");
+    const mxArray *trust = gateway_argument(nrhs, prhs, 4);
+    const uint32_t flags =
+        trust != NULL && mxIsLogicalScalar(trust) && *mxGetLogicals(trust) ? MHE_CONFIG_TRUST : 0;
+    *config = NULL;
+    if (strchr(text, '\n') != NULL) {
+        return mhe_config_parse("config", text, strlen(text), folder, sets, n, flags, &gateway_host,
+                                config, err);
+    }
+    if (folder != NULL) {
+        mexErrMsgIdAndTxt("myohorizon:argument",
+                          "folder is for a config given as a struct or a text; a file has its own");
+    }
+    return mhe_config_read(text, sets, n, flags, &gateway_host, config, err);
+}
+
+static uint64_t last_handle;
+
+uint64_t gateway_new_handle(void) {
+    return ++last_handle;
+}
+
+mxArray *gateway_handle_out(uint64_t id) {
+    mxArray *out = mxCreateNumericMatrix(1, 1, mxUINT64_CLASS, mxREAL);
+    *(uint64_t *)mxGetData(out) = id;
+    return out;
+}
+
+uint64_t gateway_handle_of(const mxArray *value) {
+    const int is_one =
+        value != NULL && mxIsClass(value, "uint64") && mxGetNumberOfElements(value) == 1;
+    return is_one ? *(const uint64_t *)mxGetData(value) : 0;
 }
 
 /* ---- what goes out ---- */
+
+mxArray *gateway_struct(void) {
+    return mxCreateStructMatrix(1, 1, 0, NULL);
+}
+
+mxArray *gateway_dropped_out(const mhe_config *config) {
+    int32_t n = 0;
+    while (mhe_config_dropped(config, n) != NULL) {
+        n++;
+    }
+    mxArray *out = mxCreateCellMatrix(1, (mwSize)n);
+    for (int32_t i = 0; i < n; i++) {
+        mxSetCell(out, (mwIndex)i, mxCreateString(mhe_config_dropped(config, i)));
+    }
+    return out;
+}
+
+void gateway_add_names(mxArray *out, const mhe_estimator_info *info) {
+    gateway_add(out, "coordinate_names", gateway_names_out(info->coordinate_names, info->n_q));
+    gateway_add(out, "muscle_names", gateway_names_out(info->muscle_names, info->n_muscles));
+    gateway_add(out, "marker_names", gateway_names_out(info->marker_names, info->n_markers));
+}
 
 mxArray *gateway_vector_out(const double *values, int32_t n) {
     mxArray *out = mxCreateDoubleMatrix((mwSize)(values == NULL ? 0 : n), 1, mxREAL);

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Debian packages: cmake --preset package && cmake --build --preset package && cpack --preset package
-#   libmhe0  libmhe-dev  myohorizon  python3-myohorizon  octave-myohorizon
+#   myohorizon (programs, plugins, models; needs none of the others)  python3-myohorizon  octave-myohorizon
+#   libmhe0 (the library for other programs)  libmhe-dev
 # What an install rule does not name goes to myohorizon.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME myohorizon)
@@ -42,22 +43,25 @@ set(same "(= ${PROJECT_VERSION}-1)")
 set(about "Joint angles, muscle activations and muscle forces from markers and EMG,\nframe by frame, with a musculoskeletal model (OpenSim, biorbd).\n")
 mhe_package(libmhe0 libmhe0 libs DEPENDS ""
     SUMMARY "moving horizon estimation of muscle forces (library)"
-    TEXT "${about}This package has the library that programs embed. Its plugins are in the\npackage myohorizon."
+    TEXT "${about}This package has the library for programs that embed it. Its plugins are in\nthe package myohorizon."
     MORE PACKAGE_RECOMMENDS "myohorizon ${same}"
-         PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/packaging/libmhe0/triggers)
-set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+         PACKAGE_CONTROL_EXTRA "${PROJECT_SOURCE_DIR}/packaging/libmhe0/triggers|${PROJECT_BINARY_DIR}/packaging/shlibs")
+# While the major version is 0, programs need the minor version that they were built with.
+math(EXPR next_minor "${PROJECT_VERSION_MINOR} + 1")
+file(WRITE ${PROJECT_BINARY_DIR}/packaging/shlibs
+    "libmhe ${PROJECT_VERSION_MAJOR} libmhe0 (>= ${PROJECT_VERSION}), libmhe0 (<< ${PROJECT_VERSION_MAJOR}.${next_minor}~)\n")
 mhe_package(dev libmhe-dev libdevel DEPENDS "libmhe0 ${same}"
     SUMMARY "moving horizon estimation of muscle forces (development)"
     TEXT "${about}This package has headers, CMake and pkg-config files, the conformance checks\nfor plugins, and examples of plugins and of an embedding program.")
-mhe_package(myohorizon myohorizon science DEPENDS "libmhe0 ${same}"
+mhe_package(myohorizon myohorizon science DEPENDS ""
     SUMMARY "muscle forces from markers and EMG by moving horizon estimation"
-    TEXT "${about}This package has the programs (mhe-run, mhe-live, mhe-model, mhe-sim,\nmhe-study, mhe-bench), all plugins, models with demonstrations, documentation."
+    TEXT "${about}This package has the programs (mhe-run, mhe-live, mhe-model, mhe-calibrate,\nmhe-sim, mhe-study, mhe-bench), all plugins, models with demonstrations,\ndocumentation."
     MORE PACKAGE_RECOMMENDS "gnuplot-nox"
          PACKAGE_SUGGESTS "python3-myohorizon, python3-pandas, python3-statsmodels, python3-matplotlib")
 if(TARGET mhe_python)
     list(APPEND CPACK_COMPONENTS_ALL python)
     mhe_package(python python3-myohorizon python
-        DEPENDS "python3, python3-numpy, python3-cffi-backend (>= 1.15), libmhe0 ${same}, myohorizon ${same}"
+        DEPENDS "python3, python3-numpy, python3-cffi-backend (>= 1.15), myohorizon ${same}"
         SUMMARY "moving horizon estimation of muscle forces (Python)"
         TEXT "${about}This package has the module myohorizon for Python 3."
         MORE PACKAGE_ARCHITECTURE all PACKAGE_SHLIBDEPS OFF PACKAGE_RECOMMENDS "python3-pandas"
@@ -68,7 +72,7 @@ if(TARGET mhe_octave)
     list(APPEND CPACK_COMPONENTS_ALL octave)
     list(APPEND CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${MHE_OCTAVE_LIBRARY_DIR})
     mhe_package(octave octave-myohorizon math
-        DEPENDS "${MHE_OCTAVE_ABI}, libmhe0 ${same}, myohorizon ${same}"
+        DEPENDS "${MHE_OCTAVE_ABI}, myohorizon ${same}"
         SUMMARY "moving horizon estimation of muscle forces (Octave)"
         TEXT "${about}This package has the package +myohorizon for GNU Octave.")
 endif()

@@ -12,7 +12,7 @@ skip() {
 }
 [ "$(id -u)" -eq 0 ] || skip "a chroot needs root"
 command -v mmdebstrap > /dev/null || skip "mmdebstrap is missing"
-[ -e "$(echo "$debs"/libmhe0_*.deb)" ] || skip "there are no packages in $debs"
+[ -e "$(echo "$debs"/myohorizon_*.deb)" ] || skip "there are no packages in $debs"
 work=$(mktemp -d)
 root=$work/root
 trap 'umount "$root/proc" 2> /dev/null; rm -rf --one-file-system "$work"' EXIT
@@ -44,7 +44,7 @@ inside() {
         exit 1
     fi
 }
-inside "apt install" 'apt-get install -y /debs/libmhe0_*.deb /debs/myohorizon_*.deb'
+inside "apt install" 'cd /debs && apt-get install -y ./myohorizon_*.deb'
 inside "the README's demo" 'cd /tmp && cp -r /usr/share/mhe/models . && mhe-run models/arm19/demo.yaml --out out/demo &&
     [ -s out/demo/report.html ] && [ "$(sed "1,/endheader/d" out/demo/estimates.sto | grep -c .)" -eq 95 ]'
 inside "a man page and completion of every program" 'for program in /usr/bin/mhe-*; do
@@ -52,15 +52,22 @@ inside "a man page and completion of every program" 'for program in /usr/bin/mhe
         [ -s /usr/share/man/man1/$name.1.gz ]
         [ -s /usr/share/bash-completion/completions/$name ]
     done'
-inside "apt install, Python" 'apt-get install -y --no-install-recommends /debs/python3-myohorizon_*.deb python3-pandas'
+inside "apt install, Python" 'cd /debs && apt-get install -y --no-install-recommends ./python3-myohorizon_*.deb python3-pandas'
 inside "the Python page's first block" 'cd /tmp && python3 /debs/first.py'
 if [ -e "$(echo "$debs"/octave-myohorizon_*.deb)" ]; then
-    inside "apt install, Octave" 'apt-get install -y --no-install-recommends /debs/octave-myohorizon_*.deb'
+    inside "apt install, Octave" 'cd /debs && apt-get install -y --no-install-recommends ./octave-myohorizon_*.deb'
     inside "the Octave page's first block" 'cd /tmp && octave-cli --norc --no-gui /debs/first.m'
 fi
-inside "apt install, development" 'apt-get install -y --no-install-recommends /debs/libmhe-dev_*.deb cmake gcc g++ make pkg-config libcmocka-dev'
+inside "apt install, development" 'cd /debs && apt-get install -y --no-install-recommends ./libmhe0_*.deb ./libmhe-dev_*.deb \
+    cmake gcc g++ make pkg-config libcmocka-dev dpkg-dev'
 inside "an example plugin, by the plugin page" 'cd /tmp && cp -r /usr/share/mhe/examples/cost_effort mine && cd mine &&
     cmake -S . -B build && cmake --build build && ctest --test-dir build &&
     MHE_PLUGIN_PATH=$PWD/build mhe-run --describe org.example.cost.effort'
-inside "apt purge" 'apt-get purge -y libmhe0 && [ ! -e /usr/share/mhe ] && [ ! -e /usr/lib/*/mhe ] && [ ! -e /usr/lib/python3/dist-packages/myohorizon ]'
+inside "a program that embeds the library, and what a package of it would depend on" 'cd /tmp &&
+    cc /usr/share/mhe/examples/stream/stream.c -D_POSIX_C_SOURCE=200809L $(pkg-config --cflags --libs mhe) -o stream &&
+    ldd stream | grep -q "libmhe.so.0 => /lib/x86_64-linux-gnu/libmhe.so.0\|libmhe.so.0 => /usr/lib" &&
+    [ "$(./stream models/arm19/demo.yaml solver.plugin=mhe.solver.rti | wc -l)" -eq 94 ] &&
+    mkdir -p debian && printf "Source: s\n\nPackage: s\nArchitecture: any\n" > debian/control &&
+    dpkg-shlibdeps -O stream 2> /dev/null | grep -q "libmhe0 (>= 0" && dpkg-shlibdeps -O stream'
+inside "apt purge" 'apt-get purge -y libmhe0 myohorizon && [ ! -e /usr/share/mhe ] && [ ! -e /usr/lib/*/mhe ] && [ ! -e /usr/lib/python3/dist-packages/myohorizon ]'
 echo "installed, tried and removed in $suite"

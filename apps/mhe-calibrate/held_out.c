@@ -68,14 +68,15 @@ static mhe_status estimate_all(mhe_estimator *e, const mhi_recording *r, means *
     return status;
 }
 
-mhe_status held_out_measure(const char *config, const mhi_plan_recording *recording,
-                            const mhe_host *host, held_out *out, mhe_error *err) {
+mhe_status held_out_measure(const char *config, const char *const *set, int32_t n_set,
+                            const mhi_plan_recording *recording, const mhe_host *host,
+                            held_out *out, mhe_error *err) {
     mhe_config *read = NULL;
     mhi_recording *r = NULL;
     mhe_estimator *e = NULL;
     const mhe_description *model = NULL;
     means m = {0};
-    mhe_status status = mhe_config_read(config, NULL, 0, 0, host, &read, err);
+    mhe_status status = mhe_config_read(config, set, n_set, 0, host, &read, err);
     if (status == MHE_OK) {
         mhi_data_section *data = &read->run->data;
         data->markers = recording->markers;

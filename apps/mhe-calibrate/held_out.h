@@ -13,7 +13,8 @@ typedef struct held_out {
 } held_out;
 
 /* With the model and the EMG's channels of `config`, on the files of `recording`. */
-mhe_status held_out_measure(const char *config, const mhi_plan_recording *recording,
-                            const mhe_host *host, held_out *out, mhe_error *err);
+mhe_status held_out_measure(const char *config, const char *const *set, int32_t n_set,
+                            const mhi_plan_recording *recording, const mhe_host *host,
+                            held_out *out, mhe_error *err);
 
 #endif

@@ -4,6 +4,7 @@
 #include "calibrate/person.h"
 #include "console.h"
 #include "report.h"
+#include "scaled.h"
 #include "words.h"
 
 #include <math.h>
@@ -59,13 +60,22 @@ static int32_t show(void *data, int32_t iteration, double objective, double kkt)
  * then lack: a motion to start from, however wrong the model is. */
 #define START_COSTS "costs=[{plugin: mhe.cost.emg-markers, residual_torque: 10}]"
 
+static mhe_status out_folder(const arguments *a, const mhi_run *run, mhi_text *out,
+                             mhe_error *err) {
+    mhi_text_add(out, "%s%s%s", a->out != NULL ? a->out : "out/", a->out != NULL ? "" : run->name,
+                 a->out != NULL ? "" : "-calibrated");
+    return out->failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+}
+
 /* The config with the solver that section calibrate asks for: all of a motion at once needs no
  * real-time iteration; and that of the start. */
-static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run **run,
-                           mhi_run **start, mhe_error *err) {
+static mhe_status read_run(const arguments *a, const mhe_host *host, mhi_registry *registry,
+                           mhi_run **run, mhi_run **start, mhe_error *err) {
     mhi_plan plan;
     mhi_arena arena = {0};
-    const char **set = MHI_TAKE(&arena, const char *, a->set.n + 2);
+    mhi_text model = {0};
+    int32_t n = 0;
+    const char **set = MHI_TAKE(&arena, const char *, a->set.n + 3);
     mhe_status status = mhi_run_read(a->config, a->set.values, a->set.n, registry, run, err);
     if (status == MHE_OK) {
         status = mhi_plan_read(*run, &plan, err);
@@ -73,22 +83,33 @@ static mhe_status read_run(const arguments *a, mhi_registry *registry, mhi_run *
     if (status == MHE_OK && set == NULL) {
         status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
+    if (status == MHE_OK && plan.scale != NULL) {
+        mhi_text out = {0};
+        status = out_folder(a, *run, &out, err);
+        status = status == MHE_OK ? scaled_make(host, plan.scale, out.data, a->quiet, &model, err)
+                                  : status;
+        mhi_text_free(&out);
+    }
     if (status == MHE_OK) {
-        for (int32_t i = 0; i < a->set.n; i++) {
-            set[i] = a->set.values[i];
+        for (n = 0; n < a->set.n; n++) {
+            set[n] = a->set.values[n];
         }
-        set[a->set.n] = mhi_arena_format(
+        if (plan.scale != NULL) {
+            set[n++] = model.data;
+        }
+        set[n++] = mhi_arena_format(
             &arena, "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %g}",
             plan.solver == 0 ? "rti" : "ipopt", plan.solver == 0 ? "preset: robust, " : "",
-            (int)plan.max_iterations, fmin(1e-4, plan.tolerance));
+            (int)plan.max_iterations, fmax(1e-12, fmin(1e-4, plan.tolerance)));
         mhi_run_free(*run);
         *run = NULL;
-        status = mhi_run_read(a->config, set, a->set.n + 1, registry, run, err);
-        set[a->set.n + 1] = START_COSTS;
+        status = mhi_run_read(a->config, set, n, registry, run, err);
+        set[n++] = START_COSTS;
     }
     if (status == MHE_OK) {
-        status = mhi_run_read(a->config, set, a->set.n + 2, registry, start, err);
+        status = mhi_run_read(a->config, set, n, registry, start, err);
     }
+    mhi_text_free(&model);
     mhi_arena_free(&arena);
     return status;
 }
@@ -125,9 +146,10 @@ static mhe_status compare(const arguments *a, const mhi_calibration *c, const ch
         const mhi_plan_recording *r = &c->plan.recordings[i];
         report_recording *one = &list[i];
         *one = (report_recording){.name = file_of(&c->plan, i), .held_out = r->hold_out};
-        status = held_out_measure(a->config, r, c->host, &one->before, err);
+        status =
+            held_out_measure(a->config, a->set.values, a->set.n, r, c->host, &one->before, err);
         if (status == MHE_OK) {
-            status = held_out_measure(person, r, c->host, &one->after, err);
+            status = held_out_measure(person, NULL, 0, r, c->host, &one->after, err);
         }
         if (status == MHE_OK && !a->quiet) {
             (void)fprintf(
@@ -188,12 +210,11 @@ static mhe_status tell(arguments *a, mhi_calibration *c, mhe_error *err) {
     mhi_text out = {0}, person = {0};
     report_recording *recordings = MHI_TAKE(&c->arena, report_recording, c->plan.n_recordings);
     report_content r = {c, recordings, c->plan.n_recordings, {0}};
-    mhi_text_add(&out, "%s%s%s", a->out != NULL ? a->out : "out/",
-                 a->out != NULL ? "" : c->run->name, a->out != NULL ? "" : "-calibrated");
+    mhe_status status = out_folder(a, c->run, &out, err);
     mhi_text_add(&person, "%s/calibrated.yaml", out.failed ? "" : out.data);
-    mhe_status status = out.failed || person.failed || recordings == NULL
-                            ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                            : write_person(c, out.data, err);
+    status = status != MHE_OK                      ? status
+             : person.failed || recordings == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                                                   : write_person(c, out.data, err);
     if (status == MHE_OK) {
         status = compare(a, c, person.data, recordings, err);
     }
@@ -216,7 +237,7 @@ static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *re
                             mhe_error *err) {
     mhi_run *run = NULL, *start = NULL;
     mhi_calibration c = {.progress = NULL};
-    mhe_status status = read_run(a, registry, &run, &start, err);
+    mhe_status status = read_run(a, host, registry, &run, &start, err);
     if (status == MHE_OK) {
         status = mhi_calibration_open(run, start, host, &c, err);
         c.progress = show;

@@ -10,7 +10,7 @@
 
 typedef struct arguments {
     const char *model, *poses, *out;
-    int32_t mode, json, paths;
+    int32_t mode, json, paths, steps;
     words_list others;
 } arguments;
 
@@ -48,15 +48,24 @@ static const words_command commands[] = {
              "by marker distances of a static trial, muscles by their paths, then the markers' "
              "places",
      .most = 1,
-     .missing = "which setup? mhe-model --help"}};
+     .missing = "which setup? mhe-model --help"},
+    {.name = "sweep",
+     .operand = "MODEL",
+     .what = "model file",
+     .help = "where lengths of paths jump by more than 1 mm while one coordinate after the other "
+             "goes through its range: at conditional points, and where a path changes its way "
+             "around obstacles",
+     .most = 1,
+     .missing = "which model? mhe-model --help"}};
 #define INFO 1u
 #define EVALUATE 2u
 #define SCALE 4u
+#define SWEEP 8u
 #define AT(field) offsetof(arguments, field)
 
 static const words_option options[] = {{.name = "--json",
-                                        .help = "info as JSON",
-                                        .commands = INFO,
+                                        .help = "info or sweep as JSON",
+                                        .commands = INFO | SWEEP,
                                         .kind = WORDS_FLAG,
                                         .at = AT(json),
                                         .low = 1},
@@ -79,7 +88,15 @@ static const words_option options[] = {{.name = "--json",
                                         .commands = EVALUATE,
                                         .kind = WORDS_OTHER,
                                         .at = AT(paths),
-                                        .take = read_paths}};
+                                        .take = read_paths},
+                                       {.name = "--steps",
+                                        .value = "N",
+                                        .help = "of each coordinate, 400 unless given",
+                                        .commands = SWEEP,
+                                        .kind = WORDS_INT,
+                                        .at = AT(steps),
+                                        .low = 1,
+                                        .high = 100000}};
 
 static const words_program program = {
     .name = "mhe-model",
@@ -88,10 +105,11 @@ static const words_program program = {
              "  mhe-model evaluate MODEL --poses FILE.json [--out FILE.json] [--paths "
              "exact|fitted]\n"
              "  mhe-model scale SETUP.xml --out MODEL.osim\n"
+             "  mhe-model sweep MODEL [--steps N] [--json]\n"
              "  mhe-model --version | --help\n",
     .notes = "Exit status: 0 done; 2 the command line or a file is wrong; 1 anything else.\n",
     .commands = commands,
-    .n_commands = 3,
+    .n_commands = 4,
     .options = options,
     .n_options = sizeof options / sizeof options[0],
     .mode = AT(mode),
@@ -154,6 +172,10 @@ static mhe_status answer_to(const mhe_host *host, int32_t command, const argumen
     if (command == 0) {
         return mhe_model_info(host, w->model, w->json ? MHE_FORMAT_JSON : MHE_FORMAT_TEXT, answer,
                               err);
+    }
+    if (command == 3) {
+        return mhe_model_sweep(host, w->model, w->steps > 0 ? w->steps : 400,
+                               w->json ? MHE_FORMAT_JSON : MHE_FORMAT_TEXT, answer, err);
     }
     if (command == 2) {
         return w->out == NULL ? mhe_fail(err, MHE_E_ARGUMENT, "where to? --out MODEL.osim")

@@ -21,10 +21,8 @@ def _candidates():
         folder = os.path.dirname(folder)
         for lib in ("lib", "lib64"):
             place = os.path.join(folder, lib)
-            found.append(os.path.join(place, "libmhe.so.0"))
-            if os.path.isdir(place):
-                found += [os.path.join(place, triplet, "libmhe.so.0")
-                          for triplet in sorted(os.listdir(place)) if triplet.endswith("-linux-gnu")]
+            triplets = [name for name in sorted(os.listdir(place)) if name.endswith("-linux-gnu")] if os.path.isdir(place) else []
+            found += [os.path.join(place, below, own, "libmhe.so.0") for below in ("", *triplets) for own in ("mhe", "")]
     return [path for path in found if os.path.exists(path)] + ["libmhe.so.0"]
 
 
@@ -40,7 +38,7 @@ def _load():
         if version.split(".")[:2] == texts["MHE_VERSION"].split(".")[:2]:
             return library, path
         reasons.append(f"{path}: is of version {version}, this package of {texts['MHE_VERSION']}")
-    raise ImportError("libmhe.so.0 was not found (package libmhe0; or name it in MYOHORIZON_LIBRARY): "
+    raise ImportError("libmhe.so.0 was not found (package myohorizon; or name it in MYOHORIZON_LIBRARY): "
                       + "; ".join(reasons))
 
 

@@ -12,7 +12,7 @@ from .errors import InputError, NumericError, OutputError
 def find(name):
     """The program beside the library, or the one of the PATH."""
     folder = os.path.dirname(os.path.realpath(_library.path)) if "/" in _library.path else ""
-    for place in ("../bin", "../../bin"):
+    for place in ("../bin", "../../bin", "../../../bin"):
         path = os.path.join(folder, place, name)
         if folder and os.access(path, os.X_OK):
             return path

@@ -21,7 +21,8 @@ class Live:
 
     def __init__(self, config, *, folder=None, record=None, wait=0.0, config_folder=None, trust=False, functions=None, **keys):
         self._pointer = ffi.NULL
-        self._lock = threading.Lock()
+        self._lock = threading.Lock()  # of a run
+        self._end = threading.RLock()  # of what may come beside it
         self._config = Config(config, keys, folder=config_folder, trust=trust, functions=functions)
         self._error = new_error()
         words = [ffi.NULL if word is None else ffi.new("char[]", encode(word)) for word in (folder, record)]
@@ -43,11 +44,13 @@ class Live:
     def run(self, seconds=0.0):
         """Waits for the streams and estimates until stop(), Ctrl-C, the end of all sources, or `seconds` of
         estimates (0: no end)."""
+        self._live()
         found = []
 
         def work():
             with self._lock:
-                found.append(lib.mhe_live_run(self._live(), seconds, self._error))
+                if self._pointer != ffi.NULL:
+                    found.append(lib.mhe_live_run(self._pointer, seconds, self._error))
 
         worker = threading.Thread(target=work)
         worker.start()
@@ -64,8 +67,23 @@ class Live:
 
     def stop(self):
         """Ends run() soon; from any thread."""
-        if self._pointer != ffi.NULL:
-            lib.mhe_live_stop(self._pointer)
+        with self._end:  # it may be closed meanwhile
+            if self._pointer != ffi.NULL:
+                lib.mhe_live_stop(self._pointer)
+
+    def command(self, line):
+        """Asks for "record-start", "record-stop", "mvc-start ELECTRODE", "mvc-stop", "label CAME=MODEL" or "stop", done
+        between two frames; from any thread, while run() is at work."""
+        error, word = new_error(), encode(line)
+        with self._end:
+            check(lib.mhe_live_command(self._live(), word, error), error)
+
+    def state(self):
+        """What the run is at, as its sinks have it, as a dict; from any thread."""
+        error, out = new_error(), ffi.new("char **")
+        with self._end:
+            check(lib.mhe_live_state(self._live(), out, error), error)
+        return json.loads(taken_text(out[0]))
 
     def summary(self):
         """Streams, frames, latencies, sinks, as a dict."""
@@ -75,8 +93,9 @@ class Live:
             return json.loads(taken_text(out[0]))
 
     def close(self):
+        """Ends it, waits for a run() in another thread, and gives back its memory. Twice is fine."""
         self.stop()
-        with self._lock:
+        with self._lock, self._end:
             pointer, self._pointer = self._pointer, ffi.NULL
             lib.mhe_live_close(pointer)
             if pointer != ffi.NULL:

@@ -56,6 +56,20 @@ def test_what_is_forgotten_or_refused_leaves_nothing():
     assert resident_kb() - before < (60000 if SANITIZED else 2000)
 
 
+@pytest.mark.skipif("address" not in os.environ.get("MHE_SANITIZE", ""), reason="without the address sanitizer")
+def test_the_sanitizer_watches():
+    """A read beyond what Python gave the library is reported: these runs can fail."""
+    code = f"""
+import myohorizon
+from myohorizon._library import ffi, lib
+e = myohorizon.Estimator({str(DEMO)!r})
+short = ffi.new("double[]", 2)
+lib.mhe_estimator_set_start(e._pointer, short, short, e._error)
+"""
+    done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True)
+    assert done.returncode != 0 and "heap-buffer-overflow" in done.stderr, done.stderr
+
+
 def test_import_takes_less_than_300_ms():
     if SANITIZED:
         pytest.skip("times under a sanitizer mean nothing")

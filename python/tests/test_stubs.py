@@ -2,7 +2,10 @@
 """The type stubs say what is there; every public name has a docstring."""
 import ast
 import inspect
+import re
 from pathlib import Path
+
+from support import SOURCE
 
 import myohorizon
 
@@ -49,3 +52,19 @@ def test_everything_public_is_explained():
             for member, value in vars(real).items():
                 if not member.startswith("_") and inspect.isfunction(value) and real.__module__.startswith("myohorizon"):
                     assert value.__doc__ or member in ("close", "table", "xarray", "labels"), f"{name}.{member}"
+
+
+def test_octave_and_matlab_have_the_same_shape():
+    """Each function is a file, each method one of the class's or, what only tells, a field of info()."""
+    package = SOURCE / "matlab/+myohorizon"
+    told = set(re.findall(r'"(\w+)", ', (SOURCE / "matlab/gateway_estimator.c").read_text() + (SOURCE / "matlab/gateway_values.c").read_text()))
+    in_python_alone = {"Cost", "stop"}  # costs are called back; another thread stops
+    for name in set(myohorizon.__all__) - in_python_alone:
+        real = getattr(myohorizon, name)
+        if inspect.isfunction(real):
+            assert (package / f"{name}.m").exists(), name
+        elif name in ("Estimator", "Live", "Model"):
+            text = (package / f"{name}.m").read_text()
+            has = set(re.findall(r"function (?:\w+ = )?(\w+)\(self", text)) | set(re.findall(r"^ {8}(\w+)(?: %.*)?$", text, re.M)) | told
+            wanted = {member for member in vars(real) if not member.startswith("_")} - in_python_alone
+            assert wanted <= has, f"{name}: {wanted - has}"

@@ -120,16 +120,120 @@ def test_finds():
     assert done.returncode == 0, done.stderr
 
 
+def point_of(text, muscle):
+    """The last point of a muscle's path, as numbers and as its place in the text."""
+    element = re.search(r'Muscle name="%s">.*?</\w+Muscle>' % muscle, text, re.S)
+    last = list(re.finditer("<location>([^<]+)</location>", element.group(0)))[-1]
+    return [float(x) for x in last.group(1).split()], element.start() + last.start(1), element.start() + last.end(1)
+
+
+def test_where_and_when():
+    """Where a muscle ends, by how much the EMG is early and what a body weighs are found, and stand in what is written."""
+    off, early, heavier = [0.006, -0.004, 0.008], 0.03, 0.7
+    with open(ARM) as file:
+        truth = file.read()
+    at, first, end = point_of(truth, "BRA")
+    text = truth[:first] + " ".join("%.10g" % (a - b) for a, b in zip(at, off)) + truth[end:]
+    mass = re.search(r'<Body name="LowerArm1">.*?<mass>([^<]+)', text, re.S)
+    text = text[:mass.start(1)] + "%.10g" % (float(mass.group(1)) / heavier) + text[mass.end(1):]
+    write("moved.osim", text)
+    for motion in "ABC":
+        with open(motion + "/emg.sto") as file:
+            lines = file.read().split("\n")
+        head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+        rows = [line.split("\t") for line in lines[head + 1:] if line]
+        write(motion + "_early.sto", "\n".join(lines[:head + 1] + ["\t".join(["%.4f" % (float(row[0]) - early)] + row[1:])
+                                                                  for row in rows]) + "\n")
+    config = re.sub("([ABC])_emg", r"\1_early", CONFIG).replace("model.osim", "moved.osim")
+    write("moved.yaml", config[:config.index("  parameters:")] + """  parameters:
+    - {name: insertion, sd: 0.01, muscles: [BRA]}
+    - {name: emg_delay, together: true}
+    - {name: segment_mass, sd: 0.3, bodies: [LowerArm1]}
+""")
+    done = run(CALIBRATE, "moved.yaml", "--out", "moved", "--quiet")
+    assert done.returncode == 0, done.stderr
+    with open("moved/calibration.json") as file:
+        told = json.load(file)
+    assert told["outcome"] == "converged", told["outcome"]
+    held = next(r for r in told["recordings"] if r["held_out"])
+    assert held["after"]["force_n"] < 0.3 * held["before"]["force_n"], held
+    with open("moved/parameters.csv") as file:
+        rows = {row["parameter"]: row for row in csv.DictReader(file)}
+    found = [rows["insertion of BRA, " + axis] for axis in "xyz"]
+    errors = [float(row["after"]) - b for row, b in zip(found, off)]
+    assert all(abs(e) < 3 * float(row["sd"]) for e, row in zip(errors, found)), (errors, found)
+    assert max(abs(e) for e in errors[:2]) < 0.001, (errors, found)  # z is along the elbow's axis: nothing tells it
+    assert float(found[2]["sd"]) > 0.006 > 3 * float(found[1]["sd"]), found
+    assert abs(float(rows["emg_delay of Pectoral2 and 18 more"]["after"]) - early) < 0.004, rows
+    assert abs(float(rows["segment_mass of LowerArm1"]["after"]) / heavier - 1) < 0.1, rows
+    with open("moved/calibrated.osim") as file:
+        text = file.read()
+    for now, right, shift, row in zip(point_of(text, "BRA")[0], at, off, found):
+        assert abs(now - (right - shift) - float(row["after"])) < 1e-7, (now, right, row)
+    weighs = re.search(r'<Body name="LowerArm1">.*?<mass>([^<]+)', text, re.S).group(1)
+    factor = float(weighs) / float(mass.group(1)) * heavier
+    assert abs(factor / float(rows["segment_mass of LowerArm1"]["after"]) - 1) < 1e-5, (weighs, rows)
+    with open("moved/calibrated.yaml") as file:
+        delays = [float(x) for x in re.findall(r"\bdelay: ([0-9.]+)", file.read())]
+    assert any(abs(delay - early) < 0.004 for delay in delays), delays
+
+
+def expect(what, config, *words):
+    write("bad.yaml", config)
+    done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
+    lines = [line for line in done.stderr.split("\n") if line and "warning" not in line]
+    assert done.returncode == 2, (what, done.returncode, done.stderr)
+    assert len(lines) == 1, (what, done.stderr)
+    for word in words:
+        assert word in lines[0], (what, word, lines[0])
+    assert not os.path.exists("bad/calibrated.osim"), what
+
+
+SETUP = """<OpenSimDocument Version="20302"><ScaleTool name="person"><mass>%s</mass>
+<GenericModelMaker><model_file>%s</model_file></GenericModelMaker>
+<ModelScaler><apply>true</apply><preserve_mass_distribution>true</preserve_mass_distribution>%s</ModelScaler>
+<MarkerPlacer><apply>false</apply></MarkerPlacer></ScaleTool></OpenSimDocument>
+"""
+BY_HAND = """<scaling_order>manualScale</scaling_order><ScaleSet><objects><Scale><scales>0.9 0.9 0.9</scales><segment>Arm</segment>
+<apply>true</apply></Scale></objects></ScaleSet>"""
+BY_MARKERS = """<scaling_order>measurements</scaling_order><MeasurementSet><objects><Measurement name="arm"><apply>true</apply>
+<MarkerPairSet><objects><MarkerPair><markers> DELT EPICl </markers></MarkerPair></objects></MarkerPairSet>
+<BodyScaleSet><objects><BodyScale name="Arm"><axes> X Y Z </axes></BodyScale></objects></BodyScaleSet></Measurement></objects>
+</MeasurementSet><marker_file>A/markers.trc</marker_file><time_range> 0 0.1 </time_range>"""
+
+
+def test_scales_first():
+    """From a generic model whose upper arm is too short: scaled to the markers, then calibrated."""
+    with open("model.osim") as file:
+        mass = sum(float(x) for x in re.findall("<mass>([^<]+)</mass>", file.read()))
+    write("short.xml", SETUP % (mass, "model.osim", BY_HAND))
+    write("person.xml", SETUP % (mass, "short.osim", BY_MARKERS))
+    done = run(os.path.join(os.path.dirname(CALIBRATE), "mhe-model"), "scale", "short.xml", "--out", "short.osim")
+    assert done.returncode == 0, done.stderr
+    write("scaled.yaml", CONFIG.replace("model.osim", "short.osim").replace("calibrate:", "calibrate:\n  scale: person.xml"))
+    done = run(CALIBRATE, "scaled.yaml", "--out", "scaled")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"Arm +1\.1111", done.stderr), done.stderr
+    with open("scaled/calibration.json") as file:
+        told = json.load(file)
+    held = next(r for r in told["recordings"] if r["held_out"])
+    assert held["before"]["q_deg"] > 1 > 20 * held["after"]["q_deg"], held
+    with open("scaled/calibrated.osim") as one, open("model.osim") as other:
+        found, right = point_of(one.read(), "SupraSpin")[0], point_of(other.read(), "SupraSpin")[0]
+    assert max(abs(a - b) for a, b in zip(found, right)) < 1e-5, (found, right)
+    expect("no setup", CONFIG.replace("calibrate:", "calibrate:\n  scale: absent.xml"), "absent.xml")
+
+
 def test_solvers_agree():
     """The bordered recursion against Ipopt on a short recording whose controls stay off their bounds (where Ipopt's are relaxed)."""
-    found = []
+    found = []  # both until the objective does not change: a part of 1e-12 of it is 1e-7 of a gain
     recording = "    - {markers: B/markers.trc, emg: B_emg.sto, reference: B/reference.sto}\n"
     config = re.sub(r"    - \{markers: [AC].*\n", "", CONFIG)
     assert recording in config
     write("agree.yaml", config)
     for solver in ("rti", "ipopt"):
         done = run(CALIBRATE, "agree.yaml", "--out", solver, "--quiet", "--set", "calibrate.solver=" + solver, "--set",
-                   "calibrate.tolerance=1e-12", "--set", "calibrate.max_iterations=200")
+                   "calibrate.tolerance=1e-15", "--set", "calibrate.max_iterations=100")
         assert done.returncode == 0, done.stderr
         with open(solver + "/calibration.json") as file:
             told = json.load(file)
@@ -137,7 +241,7 @@ def test_solvers_agree():
         found.append(told["parameters"])
     moved = [abs(one["after"] - one["before"]) for one in found[0]]
     off = max(abs(one["after"] - other["after"]) for one, other in zip(*found))
-    assert max(moved) > 0.1 and off < 1e-6, (moved, off)
+    assert max(moved) > 0.1 and off < 1e-8, (moved, off)
 
 
 def drop_columns(path, to, names):
@@ -197,23 +301,19 @@ def test_channels():
     assert len(told) == 1 and told[0].startswith("EMG of BRD reaches 1.20 times its MVC"), told
 
 
-def expect(what, config, *words):
-    write("bad.yaml", config)
-    done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
-    lines = [line for line in done.stderr.split("\n") if line and "warning" not in line]
-    assert done.returncode == 2, (what, done.returncode, done.stderr)
-    assert len(lines) == 1, (what, done.stderr)
-    for word in words:
-        assert word in lines[0], (what, word, lines[0])
-    assert not os.path.exists("bad/calibrated.osim"), what
-
-
 def test_wrong_input():
     expect("no section", CONFIG.split("calibrate:")[0], "bad.yaml", "calibrate")
     expect("unknown parameter", CONFIG.replace("emg_gain", "emg_gian"), "bad.yaml:14", "emg_gain")
     expect("unknown muscle", CONFIG.replace("[BRA, Deltoid2]", "[BRA, Deltoid8]"), "bad.yaml:14", "Deltoid8", "Deltoid")
     expect("bounds cross", CONFIG.replace("sd: 0.2,", "sd: 0.2, lower: 2, upper: 1,"), "bad.yaml:13", "lower", "2", "1")
     expect("mean outside", CONFIG.replace("sd: 0.2,", "sd: 0.2, mean: 9,"), "bad.yaml:13", "mean", "9")
+    expect("a muscle's bodies", CONFIG.replace("emg_gain", "insertion, bodies: [hand]"), "bad.yaml:14", "insertion", "bodies")
+    expect("unknown body", CONFIG.replace("{name: emg_gain, muscles: [BRA, Deltoid2]}", "{name: segment_mass, bodies: [hnad]}"),
+           "bad.yaml:14", "hnad", "hand")
+    expect("too heavy", CONFIG.replace("{name: emg_gain, muscles: [BRA, Deltoid2]}", "segment_mass").replace(
+        "calibrate:", "calibrate:\n  body_mass: 500"), "bad.yaml", "body_mass", "500 kg", "3")
+    expect("fitted paths", CONFIG.replace("emg_gain", "insertion").replace("osim}", "osim, paths: fitted}"), "bad.yaml", "paths",
+           "exact")
     expect("twice", CONFIG.replace("[BRA, Deltoid2]", "[BRA, BRA]"), "bad.yaml:14", "BRA", "twice")
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
     expect("nothing to learn from", CONFIG.replace("reference.sto}", "reference.sto, hold_out: true}"), "bad.yaml", "learn")
@@ -239,6 +339,8 @@ def main():
         make_motion("C", 3, 0.08)
         make_person("ABC")
         test_finds()
+        test_where_and_when()
+        test_scales_first()
         test_solvers_agree()
         test_told()
         test_channels()

@@ -14,7 +14,8 @@
 #define N 8
 #define N_M 19
 #define N_K 8
-#define MOST_P 128
+#define MOST_P 256
+#define MOST_B 32
 
 static const char *const configs[] = {
     "model: {file: $ARM19}\nmuscle: {curves: degroote2016}\nbounds: {residual_torques: true}\n"
@@ -32,7 +33,7 @@ typedef struct rig {
     mhi_ocp *ocp;
     const mhe_stage_problem *problem;
     mhi_parameter list[MOST_P];
-    int32_t of_system[3 * N_M], gain[N_M], shape[N_M], marker[N_K], n_p;
+    int32_t of_system[6 * N_M + MOST_B], gain[N_M], shape[N_M], marker[N_K], delay[N_M], n_p;
     int32_t place[N];
     double p[MOST_P];
 } rig;
@@ -43,6 +44,14 @@ static int32_t add(rig *r, double value) {
     return r->n_p++;
 }
 
+/* An EMG that is smooth in time. */
+static double emg_before(const void *data, int32_t k, int32_t muscle, double delay, double *slope) {
+    const double phase = k + 0.4 * muscle - 20 * delay;
+    (void)data;
+    *slope = -0.2 * 20 * cos(phase);
+    return 0.3 + 0.2 * sin(phase);
+}
+
 /* All kinds: most numbers of a muscle each its own, one shared by three muscles. */
 static void choose(rig *r) {
     for (int32_t i = 0; i < 3 * N_M; i++) {
@@ -50,7 +59,16 @@ static void choose(rig *r) {
                           : i == 1 || i == 2 ? r->of_system[0]
                                              : add(r, 1 + 0.01 * (i % 5));
     }
+    const mhe_description *d = mhi_system_description(r->f.system);
+    for (int32_t i = 0; i < 3 * N_M; i++) { /* where muscles end */
+        r->of_system[3 * N_M + i] = i / 3 % 3 == 1 ? add(r, 0.1 * (i % 5) - 0.2) : -1;
+    }
+    assert_true(d->n_bodies <= MOST_B);
+    for (int32_t b = 0; b < d->n_bodies; b++) {
+        r->of_system[6 * N_M + b] = d->bodies[b].mass > 0 ? add(r, 1 + 0.05 * (b % 4)) : -1;
+    }
     for (int32_t i = 0; i < N_M; i++) {
+        r->delay[i] = i % 4 == 1 ? add(r, 0.3 * i) : i == 2 ? r->delay[1] : -1;
         r->gain[i] = i % 3 == 0 ? add(r, 0.8 + 0.02 * i) : -1;
         r->shape[i] = i % 2 == 0 ? add(r, i == 4 ? 5e-5 : i == 6 ? 0 : -0.1 * i) : -1;
     }
@@ -65,7 +83,7 @@ static void choose(rig *r) {
 
 static void rig_open(rig *r, const char *config) {
     static const char *const names[] = {"max_isometric_force", "optimal_fiber_length",
-                                        "tendon_slack_length"};
+                                        "tendon_slack_length", "insertion", "segment_mass"};
     memset(r, 0, sizeof *r);
     if (test_fixture_open(&r->f, config) != MHE_OK) {
         fail_msg("%s", r->f.err.text);
@@ -80,7 +98,7 @@ static void rig_open(rig *r, const char *config) {
                                      .formulation = run->formulation,
                                      .residual_torques = run->bounds.residual_torques,
                                      .parameters = names,
-                                     .n_parameters = 3};
+                                     .n_parameters = 5};
     assert_int_equal(mhi_system_create(&system, &r->system, &r->f.err), MHE_OK);
     choose(r);
     mhi_junction junction;
@@ -96,8 +114,14 @@ static void rig_open(rig *r, const char *config) {
         const mhi_use *c = &run->costs[i];
         terms[i] = (mhi_term_setup){c->plugin, c->config, c->weight, c->sigma, c->huber};
     }
-    const mhi_parameters_setup parameters = {r->n_p,  r->list,  r->of_system,
-                                             r->gain, r->shape, r->marker};
+    const mhi_parameters_setup parameters = {.n = r->n_p,
+                                             .list = r->list,
+                                             .of_system = r->of_system,
+                                             .gain = r->gain,
+                                             .shape = r->shape,
+                                             .marker = r->marker,
+                                             .delay = r->delay,
+                                             .emg_before = emg_before};
     const mhi_ocp_setup setup = {.host = &r->f.host,
                                  .system = r->system,
                                  .integrator = run->integrator.plugin,
@@ -208,6 +232,18 @@ static void check(rig *r, int32_t k, const double *x, const double *u) {
     print_message("node %d: gradient %.2g, step %.2g\n", k, of_cost, of_step);
     assert_true(of_cost >= 0 && of_cost < TOLERANCE);
     assert_true(of_step >= 0 && of_step < TOLERANCE);
+    if (u != NULL && r->place[k] < 0) {
+        int32_t idle[2] = {0};
+        for (int32_t i = 0; i < mhi_system_face(r->system)->n_p; i++) {
+            double largest = r->of_system[i] < 0;
+            for (int32_t j = 0; j < n_x && r->of_system[i] >= 0; j++) {
+                largest = fmax(largest, fabs(P[j * n_p + r->of_system[i]]));
+            }
+            idle[i >= 6 * N_M] += !(largest > 1e-9);
+        }
+        assert_true(idle[0] <= 5);    /* a slack muscle's */
+        assert_int_equal(idle[1], 5); /* bodies that are fixed to the ground */
+    }
     for (int32_t i = 0; i < n_p; i++) {
         for (int32_t j = 0; j < i; j++) {
             assert_true(pp[i * n_p + j] == pp[j * n_p + i]);
@@ -228,7 +264,9 @@ static void derivatives_by_parameters(void **state) {
         double x[128], u[64];
         rig_open(&r, configs[i]);
         set_targets(&r, &seed);
-        for (int32_t k = 0; k <= N; k++) { /* node 0 has the priors; 2 .. are a junction */
+        static const int32_t nodes[] = {0, 2, N - 1, N}; /* 0 has the priors; 2 .. a junction */
+        for (size_t j = 0; j < sizeof nodes / sizeof nodes[0]; j++) {
+            const int32_t k = nodes[j];
             random_point(&r, &seed, x, u);
             check(&r, k, x, k < N ? u : NULL);
         }
@@ -255,8 +293,8 @@ static void mixed_derivatives(void **state) {
                      MHE_OK);
     assert_true(mhi_parameters_room(r.system) <= 4096);
     assert_int_equal(mhi_parameters_measure(mhi_ocp_parameters(r.ocp), signals, r.system,
-                                            mhi_ocp_context(r.ocp), wanted, z, NULL, room, y, NULL,
-                                            NULL, &r.f.err),
+                                            mhi_ocp_context(r.ocp), wanted, k, z, NULL, room, y,
+                                            NULL, NULL, &r.f.err),
                      MHE_OK);
     for (int32_t s = 0; s <= MHI_SIGNAL_EXCITATION; s++) {
         double *target = mhi_ocp_target(r.ocp, s, k);

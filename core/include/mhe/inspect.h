@@ -51,6 +51,16 @@ MHE_API mhe_status mhe_model_evaluate(const mhe_host *host, const char *file, co
                                       const char *poses, size_t length, int32_t paths, char **text,
                                       mhe_error *err);
 
+/* Where lengths of the model's paths jump by more than 1 mm while one free coordinate after the
+ * other goes through its range (within half a turn, or 1 m, about 0) in `steps` steps, the others
+ * at their defaults: path, coordinate, its value, size, and whether a conditional point of the path
+ * goes on or off there. A solver's steps do not see a jump coming. `format`, `host`, `*text` as of
+ * mhe_model_info(). JSON: {"paths": how many, "steps", "least": m, "jumps": [{"path", "coordinate",
+ * "at": rad or m, "size": m, "conditional"}]}. MHE_E_ARGUMENT: steps not within 1 .. 100000. [cold]
+ */
+MHE_API mhe_status mhe_model_sweep(const mhe_host *host, const char *file, int32_t steps,
+                                   int32_t format, char **text, mhe_error *err);
+
 /* Scales a generic model to a person as a Scale setup of OpenSim's says (<ScaleTool>; files beside
  * it): bodies by distances of markers in a static trial and by factors stated; with them joints,
  * paths, obstacles, masses, and each muscle's optimal fibre and tendon slack length by that of its

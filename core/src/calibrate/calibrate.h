@@ -16,8 +16,8 @@
 typedef struct mhi_estimated {
     char name[160];  /* "optimal_fiber_length of BRA" */
     int32_t kind;    /* MHI_OF_* */
-    int32_t subject; /* number of the (first) muscle, or marker */
-    int32_t axis;    /* of a marker's offset, 0 .. 2; else -1 */
+    int32_t subject; /* number of the (first) muscle, marker or body */
+    int32_t axis;    /* of an offset, 0 .. 2; else -1 */
     int32_t entry;   /* of the plan */
     double unit;     /* what a parameter of the problem counts in */
     double mean, prior_sd, lower, upper;
@@ -43,7 +43,10 @@ typedef struct mhi_calibration {
     mhi_motion *motions;    /* [plan.n_recordings] */
     mhi_estimated *list;    /* [n] */
     int32_t n;
-    double *covariance; /* [n x n] of the list */
+    int32_t insertions, masses;     /* 1: are among them */
+    int32_t *list_of[MHI_OF_KINDS]; /* numbers of muscles, markers, bodies; -1: none. Of offsets
+                                     * the first of three, insertions' [n_m x 3] */
+    double *covariance;             /* [n x n] of the list */
     double *guess_x, *guess_u;
     int32_t n_intervals;
     int32_t *place; /* [n_intervals] of a junction */
@@ -65,7 +68,7 @@ mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);
 
 /* choose.c: the plan's entries as numbers, and which number of the model each belongs to. */
 mhe_status mhi_calibration_choose(mhi_calibration *c, mhe_error *err);
-/* Numbers of muscle m that are not the model's: strength ...; 1, 1, 1, 1 (gain), 0 (shape). */
+/* Number of a muscle (body) now; where it is not estimated: 1 of a factor, else 0. */
 double mhi_calibration_of(const mhi_calibration *c, int32_t kind, int32_t muscle);
 const mhi_estimated *mhi_calibration_find(const mhi_calibration *c, int32_t kind, int32_t subject,
                                           int32_t axis);
@@ -76,6 +79,10 @@ mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err
 mhe_status mhi_motion_read(mhi_calibration *c, int32_t i, mhe_error *err);
 mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t n_u, double *x,
                             double *u, mhe_error *err);
+/* EMG that the controls of node k are compared with, as it was `delay` (s) before: a smooth
+ * function of the delay. NaN: missing. */
+double mhi_motion_emg_before(const mhi_calibration *c, const mhi_motion *motion, int32_t k,
+                             int32_t muscle, double delay, double *slope);
 void mhi_motion_targets(const mhi_calibration *c, int32_t i, mhi_ocp *ocp);
 
 #endif

@@ -94,6 +94,40 @@ static void emg_target(const mhi_calibration *c, const mhi_motion *m, int32_t k,
     }
 }
 
+/* EMG of a muscle between frames: Catmull and Rom's cubic through the four about it. */
+static double emg_between(const mhi_recording *r, int32_t n_m, int32_t muscle, double frame,
+                          double *slope) {
+    const double floored = floor(frame), s = frame - floored;
+    double e[4];
+    for (int32_t i = 0; i < 4; i++) {
+        const double at = fmin(fmax(floored + i - 1, 0), r->n_frames - 1);
+        e[i] = r->emg[(ptrdiff_t)at * n_m + muscle];
+    }
+    const double c1 = 0.5 * (e[2] - e[0]), c2 = e[0] - 2.5 * e[1] + 2 * e[2] - 0.5 * e[3],
+                 c3 = 0.5 * (e[3] - e[0]) + 1.5 * (e[1] - e[2]);
+    *slope = c1 + s * (2 * c2 + 3 * s * c3);
+    return e[1] + s * (c1 + s * (c2 + s * c3));
+}
+
+double mhi_motion_emg_before(const mhi_calibration *c, const mhi_motion *m, int32_t k,
+                             int32_t muscle, double delay, double *slope) {
+    const mhi_recording *r = m->recording;
+    const int32_t ratio = c->run->horizon.ratio;
+    const int32_t n = c->run->emg.sample == MHI_EMG_SAMPLE_MEAN ? ratio : 1;
+    double sum = 0;
+    *slope = 0;
+    if (r->emg == NULL) {
+        return NAN;
+    }
+    for (int32_t i = 0; i < n; i++) {
+        double by = 0;
+        sum += emg_between(r, c->model->n_muscles, muscle,
+                           k * ratio - c->run->data.emg_delay + i - delay * r->rate, &by);
+        *slope -= by * r->rate / n;
+    }
+    return sum / n;
+}
+
 static void copy(double *target, const double *values, int32_t frame, int32_t width) {
     if (target != NULL && values != NULL) {
         memcpy(target, values + (ptrdiff_t)frame * width, sizeof *target * (size_t)width);

@@ -77,6 +77,105 @@ static mhe_status set_muscle(const mhi_calibration *c, xmlNode *root, int32_t m,
     return MHE_OK;
 }
 
+static void set_location(xmlNode *owner, const double *at) {
+    char text[96];
+    (void)snprintf(text, sizeof text, "%.10g %.10g %.10g", at[0], at[1], at[2]);
+    xmlNodeSetContent(child_of(owner, "location"), (const xmlChar *)text);
+}
+
+/* The last point of a muscle's path in the file; NULL: not found. */
+static xmlNode *last_point(xmlNode *root, const char *muscle) {
+    xmlNode *node = find_named(root, muscle, "GeometryPath"), *last = NULL;
+    static const char *const way[] = {"GeometryPath", "PathPointSet", "objects"};
+    for (int32_t i = 0; i < 3 && node != NULL; i++) {
+        node = child_of(node, way[i]);
+    }
+    for (xmlNode *point = node == NULL ? NULL : node->children; point != NULL;
+         point = point->next) {
+        last =
+            point->type == XML_ELEMENT_NODE && child_of(point, "location") != NULL ? point : last;
+    }
+    return last;
+}
+
+/* Numbers of an element's text, at most n; -1: something else stands there. */
+static int32_t read_numbers(const xmlNode *node, double *values, int32_t n) {
+    xmlChar *text = node == NULL ? NULL : xmlNodeGetContent(node);
+    char *at = (char *)text, *end = at;
+    int32_t found = 0;
+    while (at != NULL && found < n) {
+        const double value = strtod(at, &end);
+        if (end == at) {
+            break;
+        }
+        values[found++] = value;
+        at = end;
+    }
+    const int32_t clean = at != NULL && strspn(at, " \t\r\n") == strlen(at);
+    xmlFree(text);
+    return clean ? found : -1;
+}
+
+static mhe_status set_insertion(const mhi_calibration *c, xmlNode *root, int32_t m,
+                                mhe_error *err) {
+    const mhe_path *path = &c->model->paths[m];
+    if (mhi_calibration_find(c, MHI_OF_INSERTION, m, 0) == NULL) {
+        return MHE_OK;
+    }
+    const double *was = path->points[path->n_points - 1].location;
+    xmlNode *node = last_point(root, c->model->muscles[m].name);
+    double now[3], in_file[3];
+    if (node == NULL || read_numbers(child_of(node, "location"), in_file, 3) != 3) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "%s: the last path point of '%s' is not found to be "
+                        "written",
+                        c->run->model_file.file, c->model->muscles[m].name);
+    }
+    for (int32_t axis = 0; axis < 3; axis++) {
+        if (fabs(in_file[axis] - was[axis]) > 1e-9) {
+            return mhe_fail(err, MHE_E_UNSUPPORTED,
+                            "%s: the last path point of '%s' stands in a frame of its own, and "
+                            "cannot be written",
+                            c->run->model_file.file, c->model->muscles[m].name);
+        }
+        now[axis] = was[axis] + mhi_calibration_find(c, MHI_OF_INSERTION, m, axis)->value;
+    }
+    set_location(node, now);
+    return MHE_OK;
+}
+
+/* Multiplies the numbers of an element. */
+static void scale_numbers(xmlNode *owner, const char *tag, double factor) {
+    xmlNode *node = child_of(owner, tag);
+    double values[9];
+    const int32_t n = read_numbers(node, values, 9);
+    mhi_text text = {0};
+    for (int32_t i = 0; i < n; i++) {
+        mhi_text_add(&text, "%s%.10g", i == 0 ? "" : " ", factor * values[i]);
+    }
+    if (n > 0 && !text.failed) {
+        xmlNodeSetContent(node, (const xmlChar *)text.data);
+    }
+    mhi_text_free(&text);
+}
+
+static mhe_status set_body(const mhi_calibration *c, xmlNode *root, int32_t b, mhe_error *err) {
+    static const char *const tags[] = {"mass",       "inertia",    "inertia_xx", "inertia_yy",
+                                       "inertia_zz", "inertia_xy", "inertia_xz", "inertia_yz"};
+    if (mhi_calibration_find(c, MHI_OF_MASS, b, -1) == NULL) {
+        return MHE_OK;
+    }
+    xmlNode *node = find_named(root, c->model->bodies[b].name, "mass");
+    if (node == NULL) {
+        return mhe_fail(err, MHE_E_INPUT, "%s: body '%s' is not found to be written",
+                        c->run->model_file.file, c->model->bodies[b].name);
+    }
+    for (size_t i = 0; i < sizeof tags / sizeof tags[0]; i++) {
+        scale_numbers(node, tags[i], mhi_calibration_of(c, MHI_OF_MASS, b));
+    }
+    return MHE_OK;
+}
+
 static mhe_status set_marker(const mhi_calibration *c, xmlNode *root, int32_t k, mhe_error *err) {
     const mhe_marker *marker = &c->model->markers[k];
     if (mhi_calibration_find(c, MHI_OF_MARKER, k, 0) == NULL) {
@@ -87,13 +186,11 @@ static mhe_status set_marker(const mhi_calibration *c, xmlNode *root, int32_t k,
         return mhe_fail(err, MHE_E_INPUT, "%s: marker '%s' is not found to be written",
                         c->run->model_file.file, marker->name);
     }
-    char text[96];
     double at[3];
     for (int32_t axis = 0; axis < 3; axis++) {
         at[axis] = marker->location[axis] + mhi_calibration_find(c, MHI_OF_MARKER, k, axis)->value;
     }
-    (void)snprintf(text, sizeof text, "%.10g %.10g %.10g", at[0], at[1], at[2]);
-    xmlNodeSetContent(child_of(node, "location"), (const xmlChar *)text);
+    set_location(node, at);
     return MHE_OK;
 }
 
@@ -116,6 +213,10 @@ mhe_status mhi_person_model(const mhi_calibration *c, mhi_text *out, mhe_error *
     }
     for (int32_t m = 0; m < c->model->n_muscles && status == MHE_OK; m++) {
         status = set_muscle(c, xmlDocGetRootElement(doc), m, err);
+        status = status == MHE_OK ? set_insertion(c, xmlDocGetRootElement(doc), m, err) : status;
+    }
+    for (int32_t b = 0; b < c->model->n_bodies && status == MHE_OK; b++) {
+        status = set_body(c, xmlDocGetRootElement(doc), b, err);
     }
     for (int32_t k = 0; k < c->model->n_markers && status == MHE_OK; k++) {
         status = set_marker(c, xmlDocGetRootElement(doc), k, err);
@@ -188,11 +289,11 @@ static int32_t muscle_number(const mhe_description *d, const char *name) {
     return -1;
 }
 
-/* Gains and shape factors of a channel's muscles. */
+/* Gains, shape factors and delay of a channel's muscles. */
 static mhe_status set_channel(const mhi_calibration *c, mhi_emg_channel *channel, mhi_arena *arena,
                               mhe_error *err) {
     const int32_t n = channel->muscles.n;
-    double *gains = one_each(n, 1, arena), *shape = one_each(n, 0, arena);
+    double delay = 0, *gains = one_each(n, 1, arena), *shape = one_each(n, 0, arena);
     if (gains == NULL || shape == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
@@ -203,7 +304,12 @@ static mhe_status set_channel(const mhi_calibration *c, mhi_emg_channel *channel
         if (m >= 0) {
             gains[i] *= mhi_calibration_of(c, MHI_OF_GAIN, m);
             shape[i] += mhi_calibration_of(c, MHI_OF_SHAPE, m);
+            delay += mhi_calibration_of(c, MHI_OF_DELAY, m) / n; /* a channel has one */
         }
+    }
+    if (delay != 0) {
+        channel->delay =
+            fmax(0, (channel->delay >= 0 ? channel->delay : fmax(0, c->run->emg.delay)) + delay);
     }
     channel->gains = (mhe_real_list){gains, n};
     channel->shape = (mhe_real_list){shape, n};
@@ -224,7 +330,8 @@ mhe_status mhi_person_config(const mhi_calibration *c, const char *file, mhi_tex
     }
     int32_t of_emg = 0;
     for (int32_t i = 0; i < c->n; i++) {
-        of_emg |= c->list[i].kind == MHI_OF_GAIN || c->list[i].kind == MHI_OF_SHAPE;
+        of_emg |= c->list[i].kind == MHI_OF_GAIN || c->list[i].kind == MHI_OF_SHAPE ||
+                  c->list[i].kind == MHI_OF_DELAY;
     }
     if (of_emg && run.emg.n_channels == 0) {
         status = make_channels(c, &run, &arena, err);

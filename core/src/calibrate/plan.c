@@ -7,24 +7,33 @@
 #include <math.h>
 #include <string.h>
 
-const char *const mhi_plan_names[MHI_OF_KINDS] = {"max_isometric_force", "optimal_fiber_length",
-                                                  "tendon_slack_length", "emg_gain",
-                                                  "emg_shape",           "marker_offset"};
+const char *const mhi_plan_names[MHI_OF_KINDS] = {
+    "max_isometric_force", "optimal_fiber_length", "tendon_slack_length", "emg_gain",
+    "emg_shape",           "marker_offset",        "insertion",           "emg_delay",
+    "segment_mass"};
 
 /* What is known of people beforehand, where the config does not say: factors of the model's
- * numbers; gain and shape of EMG; m. */
+ * numbers; gain and shape of EMG; m; s. */
 static const struct {
     double mean, sd, lower, upper;
-} usual[MHI_OF_KINDS] = {{1, 0.3, 0.2, 3}, {1, 0.1, 0.7, 1.4}, {1, 0.05, 0.8, 1.25},
-                         {1, 0.3, 0.2, 4}, {-1, 0.6, -3, 0},   {0, 0.01, -0.05, 0.05}};
+} usual[MHI_OF_KINDS] = {{1, 0.3, 0.2, 3},        {1, 0.1, 0.7, 1.4},   {1, 0.05, 0.8, 1.25},
+                         {1, 0.3, 0.2, 4},        {-1, 0.6, -3, 0},     {0, 0.01, -0.05, 0.05},
+                         {0, 0.003, -0.02, 0.02}, {0.02, 0.02, 0, 0.2}, {1, 0.1, 0.3, 3}};
 
 static const mhe_option plan_options[] = {
+    MHE_OPT_PATH(
+        mhi_plan, scale, 0,
+        "Scale setup (.xml) of OpenSim, done first: its model is scaled to the static trial "
+        "and takes the place of model.file."),
+    MHE_OPT_REAL(mhi_plan, body_mass, NAN, 1e-3, 1e4, "kg",
+                 "What the person weighs: segment_mass expects the model's masses times the same "
+                 "factor, so that they weigh so much together."),
     MHE_OPT_REAL(mhi_plan, noise_time, 0.3, 1e-3, 60, "s",
                  "Time over which the noise of a measurement is alike: nodes closer together count "
                  "as less than one measurement each."),
     MHE_OPT_ENUM(mhi_plan, solver, "rti", "rti|ipopt", "Which solver."),
     MHE_OPT_INT(mhi_plan, max_iterations, 60, 1, 10000, "1", "Its iterations at most."),
-    MHE_OPT_REAL(mhi_plan, tolerance, 1e-4, 1e-12, 1, "1",
+    MHE_OPT_REAL(mhi_plan, tolerance, 1e-4, 1e-16, 1, "1",
                  "It ends where two iterations change the objective by less than this part."),
 };
 
@@ -42,25 +51,30 @@ static const mhe_option entry_options[] = {
     MHE_OPT_ENUM(
         mhi_plan_entry, kind, "max_isometric_force",
         "max_isometric_force|optimal_fiber_length|tendon_slack_length|emg_gain|emg_shape|"
-        "marker_offset",
+        "marker_offset|insertion|emg_delay|segment_mass",
         "What is estimated: a factor of the model's number; gain and shape factor of the EMG; "
-        "where a marker sits in its body."),
-    MHE_OPT_REAL(mhi_plan_entry, mean, NAN, -100, 100, "1 or m",
+        "where a marker, or the last point of a muscle's path, sits in its body, beside the "
+        "model's place; by how much the EMG is earlier than what it excites, beside what the "
+        "config says; a factor of a body's mass and inertia."),
+    MHE_OPT_REAL(mhi_plan_entry, mean, NAN, -100, 100, "1, m or s",
                  "What is expected beforehand; by kind."),
-    MHE_OPT_REAL(mhi_plan_entry, sd, NAN, 1e-6, 1e6, "1 or m",
+    MHE_OPT_REAL(mhi_plan_entry, sd, NAN, 1e-6, 1e6, "1, m or s",
                  "Standard deviation of that; by kind."),
-    MHE_OPT_REAL(mhi_plan_entry, lower, NAN, -100, 100, "1 or m", "Least value; by kind."),
-    MHE_OPT_REAL(mhi_plan_entry, upper, NAN, -100, 100, "1 or m", "Largest value; by kind."),
+    MHE_OPT_REAL(mhi_plan_entry, lower, NAN, -100, 100, "1, m or s", "Least value; by kind."),
+    MHE_OPT_REAL(mhi_plan_entry, upper, NAN, -100, 100, "1, m or s", "Largest value; by kind."),
     MHE_OPT_TEXTS(mhi_plan_entry, muscles, 0, "Whose; none: all muscles."),
     MHE_OPT_TEXTS(mhi_plan_entry, markers, 0, "Of marker_offset: which; none: all markers."),
-    MHE_OPT_BOOL(mhi_plan_entry, together, 0, "One number for all of these muscles."),
+    MHE_OPT_TEXTS(mhi_plan_entry, bodies, 0, "Of segment_mass: which; none: all that have a mass."),
+    MHE_OPT_BOOL(mhi_plan_entry, together, 0, "One number for all of these muscles or bodies."),
 };
 
 #define N(table) ((int32_t)(sizeof(table) / sizeof((table)[0])))
 
 static mhe_status check_entry(const mhi_run *run, mhi_plan_entry *e, mhe_error *err) {
     const char *name = mhi_plan_names[e->kind];
-    e->mean = isnan(e->mean) ? usual[e->kind].mean : e->mean;
+    if (e->kind != MHI_OF_MASS) { /* which the body's mass may say */
+        e->mean = isnan(e->mean) ? usual[e->kind].mean : e->mean;
+    }
     e->sd = isnan(e->sd) ? usual[e->kind].sd : e->sd;
     e->lower = isnan(e->lower) ? usual[e->kind].lower : e->lower;
     e->upper = isnan(e->upper) ? usual[e->kind].upper : e->upper;
@@ -75,19 +89,20 @@ static mhe_status check_entry(const mhi_run *run, mhi_plan_entry *e, mhe_error *
                            "calibrate.parameters: %s: 'mean' is %g, which is not within %g .. %g",
                            name, e->mean, e->lower, e->upper);
     }
-    if (e->kind <= MHI_OF_GAIN && e->lower <= 0) {
+    if ((e->kind <= MHI_OF_GAIN || e->kind == MHI_OF_MASS) && e->lower <= 0) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, e->node,
                            "calibrate.parameters: %s: 'lower' is %g; a factor is above 0", name,
                            e->lower);
     }
-    if (e->kind == MHI_OF_MARKER ? e->muscles.n > 0 || e->together : e->markers.n > 0) {
-        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, e->node,
-                           "calibrate.parameters: %s has no '%s'", name,
-                           e->kind != MHI_OF_MARKER ? "markers"
-                           : e->together            ? "together"
-                                                    : "muscles");
-    }
-    return MHE_OK;
+    const int32_t of_markers = e->kind == MHI_OF_MARKER, of_bodies = e->kind == MHI_OF_MASS;
+    const char *none = !of_markers && e->markers.n > 0                              ? "markers"
+                       : !of_bodies && e->bodies.n > 0                              ? "bodies"
+                       : (of_markers || of_bodies) && e->muscles.n > 0              ? "muscles"
+                       : (of_markers || e->kind == MHI_OF_INSERTION) && e->together ? "together"
+                                                                                    : NULL;
+    return none == NULL ? MHE_OK
+                        : mhi_fail_at(err, MHE_E_CONFIG, run->tree, e->node,
+                                      "calibrate.parameters: %s has no '%s'", name, none);
 }
 
 /* The key `name` of an entry is its kind. */

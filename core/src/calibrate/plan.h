@@ -23,7 +23,10 @@
 #define MHI_OF_GAIN 3
 #define MHI_OF_SHAPE 4
 #define MHI_OF_MARKER 5
-#define MHI_OF_KINDS 6
+#define MHI_OF_INSERTION 6
+#define MHI_OF_DELAY 7
+#define MHI_OF_MASS 8
+#define MHI_OF_KINDS 9
 extern const char *const mhi_plan_names[MHI_OF_KINDS];
 
 typedef struct mhi_plan_recording {
@@ -37,8 +40,8 @@ typedef struct mhi_plan_recording {
 typedef struct mhi_plan_entry {
     int32_t kind; /* MHI_OF_* */
     double mean, sd, lower, upper;
-    mhe_text_list muscles, markers; /* n = 0: all */
-    int32_t together;               /* one number for all of them */
+    mhe_text_list muscles, markers, bodies; /* n = 0: all */
+    int32_t together;                       /* one number for all of them */
     const mhi_node *node;
 } mhi_plan_entry;
 
@@ -47,6 +50,8 @@ typedef struct mhi_plan {
     int32_t n_recordings;
     mhi_plan_entry *entries;
     int32_t n_entries;
+    const char *scale; /* a Scale setup; NULL: none */
+    double body_mass;  /* kg; NaN: not known */
     double noise_time; /* s that the noise of measurements is alike */
     int32_t solver;    /* 0: mhe.solver.rti, 1: mhe.solver.ipopt */
     int32_t max_iterations;

@@ -2,6 +2,7 @@
 #include "calibrate/calibrate.h"
 #include "estimator/create.h"
 #include "io/model_file.h"
+#include "model/anatomy.h"
 #include "model/bounds.h"
 #include "ocp/junction.h"
 #include "plugin/instance.h"
@@ -65,7 +66,8 @@ static void close_problem(problem *p) {
 
 static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhi_run *run = c->run;
-    const char *names[3];
+    const char *names[5];
+    int32_t n_names = 0;
     mhi_force_setup *forces = MHI_TAKE(&c->arena, mhi_force_setup, run->forces.n + 1);
     if (forces == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
@@ -78,6 +80,22 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                         "%s: data.external_loads: recordings with external loads cannot be "
                         "calibrated from",
                         run->path);
+    }
+    for (int32_t i = MHI_OF_STRENGTH; i <= MHI_OF_SLACK; i++) {
+        names[n_names++] = mhi_plan_names[i];
+    }
+    if (c->insertions) {
+        names[n_names++] = MHI_INSERTION;
+    }
+    if (c->masses) {
+        names[n_names++] = MHI_MASS;
+    }
+    const mhi_node *model = mhi_node_find(mhi_tree_root(run->tree), "model");
+    const mhi_node *paths = model == NULL ? NULL : mhi_node_find(model, "paths");
+    if (c->insertions && paths != NULL && paths->text != NULL &&
+        strcmp(paths->text, "fitted") == 0) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, paths,
+                           "model.paths: where insertions are estimated paths must be exact");
     }
     mhi_bounds bounds;
     mhe_status status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
@@ -93,11 +111,21 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                                     .n_forces = run->forces.n,
                                     .bounds = &bounds,
                                     .parameters = names,
-                                    .n_parameters = 3};
-    for (int32_t i = 0; i < 3; i++) {
-        names[i] = mhi_plan_names[i];
-    }
+                                    .n_parameters = n_names};
     return status == MHE_OK ? mhi_system_create(&setup, &p->system, err) : status;
+}
+
+/* Whose node k of the problem is. */
+static double emg_before(const void *data, int32_t k, int32_t muscle, double delay, double *slope) {
+    const mhi_calibration *c = data;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        const mhi_motion *m = &c->motions[i];
+        if (m->first >= 0 && k >= m->first && k < m->first + m->n_nodes) {
+            return mhi_motion_emg_before(c, m, k - m->first, muscle, delay, slope);
+        }
+    }
+    *slope = 0;
+    return NAN;
 }
 
 static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
@@ -121,6 +149,8 @@ static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
                             m->run.data.markers, m->recording->rate, r->rate);
         }
     }
+    c->setup.emg_before = emg_before;
+    c->setup.emg = c;
     const mhi_ocp_setup setup = {.host = c->host,
                                  .system = p->system,
                                  .integrator = run->integrator.plugin,

@@ -130,6 +130,25 @@ static void add_forces(mhi_text *out, const mhe_description *d) {
     }
 }
 
+/* Paths whose lengths may jump. */
+static void add_jumping(mhi_text *out, const mhe_description *d) {
+    int32_t conditional = 0, several = 0;
+    for (int32_t i = 0; i < d->n_paths; i++) {
+        int32_t points = 0;
+        for (int32_t k = 0; k < d->paths[i].n_points; k++) {
+            points += d->paths[i].points[k].kind == MHE_POINT_CONDITIONAL;
+        }
+        conditional += points > 0;
+        several += d->paths[i].n_wraps > 1;
+    }
+    if (conditional + several > 0) {
+        mhi_text_add(out,
+                     "paths with conditional points: %d, around several obstacles: %d; where their "
+                     "lengths jump: mhe-model sweep\n",
+                     (int)conditional, (int)several);
+    }
+}
+
 static void add_lines(mhi_text *out, const char *what, const char *const *lines, int32_t n) {
     if (n > 0) {
         mhi_text_add(out, "\n%s: %d\n", what, (int)n);
@@ -146,6 +165,7 @@ static mhe_status add_all(mhi_text *out, const mhe_description *d, mhe_error *er
     add_bodies(out, d);
     mhe_status status = add_muscles(out, d, err);
     add_forces(out, d);
+    add_jumping(out, d);
     add_lines(out, "not supported", d->unsupported, d->n_unsupported);
     add_lines(out, "left out, of no effect here", d->dropped, d->n_dropped);
     add_lines(out, "warnings", d->warnings, d->n_warnings);

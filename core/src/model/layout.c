@@ -263,6 +263,33 @@ static int inputs(maker *m) {
     return 1;
 }
 
+/* Where muscles end, [n_m x 3]; what bodies weigh. */
+static int skeleton_parameters(maker *m) {
+    const mhi_system *s = m->s;
+    const mhe_description *d = s->description;
+    const int32_t n_i = mhi_anatomy_insertions(s->anatomy), n_b = mhi_anatomy_masses(s->anatomy);
+    entries e;
+    if (n_i > 0 && !begin(m, MHI_INSERTION, MHE_ROLE_PARAMETER, MHE_STRUCTURE_CONSTANT, n_i, &e)) {
+        return 0;
+    }
+    for (int32_t i = 0; i < n_i; i++) {
+        e.owner[i] = i / (n_i / s->face.n_m);
+        e.names[i] = d->muscles[e.owner[i]].name;
+        e.units[i] = "m";
+        e.scale[i] = 0.01;
+    }
+    if (n_b > 0 && !begin(m, MHI_MASS, MHE_ROLE_PARAMETER, MHE_STRUCTURE_CONSTANT, n_b, &e)) {
+        return 0;
+    }
+    for (int32_t b = 0; b < n_b; b++) {
+        e.owner[b] = b;
+        e.names[b] = d->bodies[b].name;
+        e.units[b] = "1";
+        e.lower[b] = 0;
+    }
+    return 1;
+}
+
 static int parameters(maker *m) {
     mhi_system *s = m->s;
     const int32_t n_m = s->face.n_m;
@@ -282,7 +309,7 @@ static int parameters(maker *m) {
             e.scale[k] = value > 0 ? value : 1;
         }
     }
-    return 1;
+    return skeleton_parameters(m);
 }
 
 /* Whose the entries of z are, and where those of a muscle stand. */
@@ -327,7 +354,7 @@ mhe_status mhi_layout_make(mhi_system *s, const mhi_system_setup *setup, mhe_err
     s->n_s = n_s;
     s->activation = s->muscle_layout.activation;
     s->z_state = MHI_TAKE(&s->arena, int32_t, n_s * s->face.n_m);
-    m.blocks = MHI_TAKE(&s->arena, mhe_block, 9 + n_s + s->n_forces + s->n_parameters);
+    m.blocks = MHI_TAKE(&s->arena, mhe_block, 11 + n_s + s->n_forces + s->n_parameters);
     if (s->z_state == NULL || m.blocks == NULL || !states(&m) || !controls(&m) || !inputs(&m) ||
         !parameters(&m)) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");

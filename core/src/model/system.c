@@ -75,7 +75,7 @@ static void muscle_derivatives(mhi_system_context *c) {
     const mhi_path_forces forces = {c->force,   c->force_l,  c->force_w, c->force_q,
                                     c->force_v, c->moment_q, c->moment_v};
     mhi_path_moment_derivatives(c, 0, n_m, &forces);
-    if (s->n_parameters > 0) {
+    if (s->face.n_p > 0) {
         mhi_parameters_forces(c);
     }
     for (int32_t i = 0; i < s->face.n_z; i++) {
@@ -132,14 +132,18 @@ int32_t mhi_system_context_spent(const mhi_system_context *c) {
 
 static mhe_status kinematics(mhi_system_context *c, const double *q, const double *v,
                              int32_t dynamics, int32_t derivatives, mhe_error *err) {
+    const int own = mhi_anatomy_insertions(c->system->anatomy) == 0;
     const mhe_kinematics out = {.size = sizeof out,
                                 .mass = dynamics ? c->mass : NULL,
                                 .bias = dynamics ? c->bias : NULL,
-                                .length = c->length,
-                                .length_q = c->length_q,
-                                .length_qq = derivatives ? c->length_qq : NULL,
+                                .length = own ? c->length : NULL,
+                                .length_q = own ? c->length_q : NULL,
+                                .length_qq = own && derivatives ? c->length_qq : NULL,
                                 .body = c->system->most_pairs > 0 ? c->body : NULL};
-    return c->system->model->kinematics(c->model, q, v, &out, err);
+    const mhe_status status = c->system->model->kinematics(c->model, q, v, &out, err);
+    return status != MHE_OK || own ? status
+                                   : mhi_anatomy_lengths(c->anatomy, q, v, c->length, c->length_q,
+                                                         derivatives ? c->length_qq : NULL, err);
 }
 
 /* moment' + other' - tau' into n_q columns of a row-major matrix of `ld`. */
@@ -181,8 +185,8 @@ static void acceleration_by_force(mhi_system_context *c, const double *by, const
     mhi_path_accelerations(c, c->solved + 2 * n_q, 3 * n_q, by, muscle, n, out);
 }
 
-static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acceleration *out,
-                                           mhe_error *err) {
+static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_system_point *at,
+                                           const mhe_acceleration *out, mhe_error *err) {
     const mhi_system *s = c->system;
     const mhe_system *f = &s->face;
     const int32_t n_q = f->n_q, n_m = f->n_m;
@@ -203,6 +207,12 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_acce
         c->tau_q[i] -= c->drive_q[i];
     }
     muscle_derivatives(c);
+    if (out->vdot_p != NULL && mhi_anatomy_masses(s->anatomy) > 0) {
+        status = mhi_parameters_masses(c, at, out->vdot, err);
+        if (status != MHE_OK) {
+            return status;
+        }
+    }
     solve_derivatives(c);
     if (out->vdot_q != NULL) {
         copy_solved(c, 0, out->vdot_q);
@@ -293,10 +303,11 @@ mhe_status mhi_system_acceleration(const mhe_system *face, void *context,
     if (rates) {
         state_rates(c, out);
     }
-    if (rates && out->zdot_p != NULL && face->n_p > 0) {
+    status = derivatives ? acceleration_derivatives(c, at, out, err) : MHE_OK;
+    if (status == MHE_OK && rates && out->zdot_p != NULL && face->n_p > 0) {
         mhi_parameters_rates(c, out->zdot_p);
     }
-    return derivatives ? acceleration_derivatives(c, out, err) : MHE_OK;
+    return status;
 }
 
 mhe_status mhi_system_activation_rate(const mhe_system *face, const double *control,

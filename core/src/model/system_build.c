@@ -139,6 +139,9 @@ static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe
         status = mhi_parameters_find(s, setup, err);
     }
     if (status == MHE_OK) {
+        status = mhi_anatomy_create(setup, &s->arena, &s->anatomy, err);
+    }
+    if (status == MHE_OK) {
         status = mhi_forces_create(s, setup, err);
     }
     if (status == MHE_OK) {
@@ -199,6 +202,7 @@ void mhi_system_free(mhi_system *s) {
     if (s->muscle_self != NULL) {
         s->muscle->destroy(s->muscle_self);
     }
+    mhi_anatomy_free(s->anatomy);
     if (s->model_self != NULL) {
         s->model->destroy(s->model_self);
     }
@@ -334,6 +338,9 @@ mhe_status mhi_system_context_create(const mhi_system *s, mhi_system_context **c
     if (status == MHE_OK) {
         status = s->model->context_create(s->model_self, &c->model, err);
     }
+    if (status == MHE_OK && s->anatomy != NULL) {
+        status = mhi_anatomy_enter(s->anatomy, &c->arena, &c->model, &c->anatomy, err);
+    }
     if (status != MHE_OK) {
         mhi_system_context_free(c);
         return status;
@@ -346,6 +353,7 @@ void mhi_system_context_free(mhi_system_context *c) {
     if (c == NULL) {
         return;
     }
+    mhi_anatomy_leave(c->anatomy);
     if (c->model != NULL) {
         c->system->model->context_destroy(c->model);
     }

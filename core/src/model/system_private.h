@@ -5,6 +5,7 @@
 #define MHI_SYSTEM_PRIVATE_H
 
 #include "base/arena.h"
+#include "model/anatomy.h"
 #include "model/system.h"
 
 /* One force plugin at work. */
@@ -31,9 +32,10 @@ struct mhi_system {
     const mhe_plugin *muscle_plugin;
     const void *muscle_config;
     mhe_muscle *muscles;     /* [n_m] the description's with the parameters' values */
-    int32_t n_parameters;    /* blocks of n_m entries */
+    int32_t n_parameters;    /* blocks of n_m entries of the muscles; behind them the anatomy's */
     int32_t *parameter;      /* [n_parameters] which of the muscle plugin's */
     size_t *parameter_at;    /* [n_parameters] place of the number in mhe_muscle */
+    mhi_anatomy *anatomy;    /* parameters of the skeleton; NULL: none */
     int32_t n_s, activation; /* states of a muscle, which of them is the activation */
     int32_t n_paths;
     int32_t *first, *end; /* [n_paths] coordinates that a path sees lie in [first, end) */
@@ -52,6 +54,7 @@ struct mhi_system {
 struct mhi_system_context {
     const mhi_system *system;
     void *model;
+    mhi_anatomy_context *anatomy;                     /* NULL: none */
     double *zero;                                     /* [n_q] */
     double *mass, *bias;                              /* [n_q x n_q], [n_q] */
     double *length, *length_q, *length_qq;            /* [n_p], [n_p x n_q], [n_p x n_q x n_q] */
@@ -93,12 +96,15 @@ struct mhi_system_context {
 /* layout.c: fills s->layout and the sizes of s->face from the plugins' layouts. */
 mhe_status mhi_layout_make(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
 
-/* parameters.c: finds the parameters that the setup names; their derivatives of muscle forces and
- * rates, out of the plugin's, into the context's; z rates' into zdot_p [n_z x n_p]. */
+/* parameters.c: finds the parameters that the setup names, muscles' first; their derivatives of
+ * muscle forces and rates, out of the plugin's, into the context's; z rates' into zdot_p [n_z x
+ * n_p]. Of the masses into moment_p, once the accelerations are known. */
 mhe_status mhi_parameters_find(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
 const char *mhi_parameter_unit(const mhi_system *s, int32_t i);
 void mhi_parameters_forces(mhi_system_context *c);
 void mhi_parameters_rates(const mhi_system_context *c, double *zdot_p);
+mhe_status mhi_parameters_masses(mhi_system_context *c, const mhe_system_point *at,
+                                 const double *vdot, mhe_error *err);
 
 /* system.c: the functions of the face. */
 mhe_status mhi_system_acceleration(const mhe_system *face, void *context,

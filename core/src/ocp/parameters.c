@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ocp/parameters.h"
 
+#include "model/anatomy.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -22,7 +24,10 @@ mhe_status mhi_parameters_create(const mhi_parameters_setup *setup, const mhi_sy
                                     .of_system = copied(arena, setup->of_system, f->n_p),
                                     .gain = copied(arena, setup->gain, f->n_m),
                                     .shape = copied(arena, setup->shape, f->n_m),
-                                    .marker = copied(arena, setup->marker, d->n_markers)},
+                                    .marker = copied(arena, setup->marker, d->n_markers),
+                                    .delay = copied(arena, setup->delay, f->n_m),
+                                    .emg_before = setup->emg_before,
+                                    .emg = setup->emg},
                           .control = mhi_system_formulation(system) == MHE_FORMULATION_EXCITATION
                                          ? MHI_SIGNAL_EXCITATION
                                          : MHI_SIGNAL_ACTIVATION,
@@ -32,7 +37,8 @@ mhe_status mhi_parameters_create(const mhi_parameters_setup *setup, const mhi_sy
                           .lower = MHI_TAKE(arena, double, setup->n),
                           .upper = MHI_TAKE(arena, double, setup->n)};
     if (list == NULL || !s->setup.of_system || !s->setup.gain || !s->setup.shape ||
-        !s->setup.marker || !s->p || !s->model || !s->system || !s->lower || !s->upper) {
+        !s->setup.marker || !s->setup.delay || !s->p || !s->model || !s->system || !s->lower ||
+        !s->upper) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     for (int32_t i = 0; i < setup->n; i++) {
@@ -41,8 +47,17 @@ mhe_status mhi_parameters_create(const mhi_parameters_setup *setup, const mhi_sy
         s->lower[i] = list[i].lower;
         s->upper[i] = list[i].upper;
     }
+    const mhe_block *moved = mhe_layout_find(f->layout, MHE_ROLE_PARAMETER, MHI_INSERTION);
+    if (moved != NULL) {
+        s->moved[0] = moved->first;
+        s->moved[1] = moved->first + moved->count;
+    }
     mhi_system_parameters(system, s->model);
     return MHE_OK;
+}
+
+static int is_moved(const mhi_parameters *s, int32_t i) {
+    return i >= s->moved[0] && i < s->moved[1];
 }
 
 mhe_status mhi_parameters_set(mhi_parameters *s, mhi_system *system, const double *p,
@@ -53,7 +68,9 @@ mhe_status mhi_parameters_set(mhi_parameters *s, mhi_system *system, const doubl
     }
     for (int32_t i = 0; i < n; i++) {
         const int32_t of = s->setup.of_system[i];
-        s->system[i] = s->model[i] * (of < 0 ? 1 : p[of]);
+        s->system[i] = of < 0           ? s->model[i]
+                       : is_moved(s, i) ? s->model[i] + MHI_OFFSET_UNIT * p[of]
+                                        : s->model[i] * p[of];
     }
     const mhe_status status = n > 0 ? mhi_system_set_parameters(system, s->system, err) : MHE_OK;
     if (status == MHE_OK) {
@@ -84,20 +101,45 @@ static void add_by(mhi_by_parameter *by, int32_t at, double value) {
     }
 }
 
-static void measure_emg(const mhi_parameters *s, const mhi_signal *control, const double *targets,
-                        double *y, mhi_by_parameter *by) {
+/* The EMG of the other time: what it was then is what this time's differs from y by. */
+static double measure_delay(const mhi_parameters *s, int32_t k, int32_t muscle,
+                            mhi_by_parameter *by) {
+    const int32_t at = s->setup.delay[muscle];
+    double none, slope;
+    if (at < 0) {
+        return 0;
+    }
+    const double now = s->setup.emg_before(s->setup.emg, k, muscle, 0, &none);
+    const double then =
+        s->setup.emg_before(s->setup.emg, k, muscle, MHI_DELAY_UNIT * s->p[at], &slope);
+    if (isnan(now) || isnan(then)) {
+        return 0;
+    }
+    if (by != NULL) {
+        add_by(by, at, -MHI_DELAY_UNIT * slope);
+    }
+    return now - then;
+}
+
+static void measure_emg(const mhi_parameters *s, const mhi_signal *control, int32_t k,
+                        const double *targets, double *y, mhi_by_parameter *by) {
     for (int32_t i = 0; i < control->n_y; i++) {
         const int32_t gain = s->setup.gain[i], shape = s->setup.shape[i], j = control->offset + i;
         double by_u = 1, by_A = 0, value = y[j];
         const int32_t absent = targets != NULL && isnan(targets[j]);
-        if (isnan(value) || absent || (gain < 0 && shape < 0)) {
+        if (isnan(value) || absent) {
+            continue;
+        }
+        const double shift = measure_delay(s, k, i, by == NULL ? NULL : &by[j]);
+        y[j] = value + shift;
+        if (gain < 0 && shape < 0) {
             continue;
         }
         if (shape >= 0) {
             value = shaped(value, s->p[shape], &by_u, &by_A);
         }
         const double g = gain < 0 ? 1 : s->p[gain];
-        y[j] = value / g;
+        y[j] = value / g + shift;
         if (by != NULL) {
             by[j].slope = by_u / g;
             add_by(&by[j], gain, -value / (g * g));
@@ -168,14 +210,14 @@ static mhe_status measure_markers(const mhi_parameters *s, const mhi_signal *mar
 
 mhe_status mhi_parameters_measure(const mhi_parameters *s, const mhi_signals *signals,
                                   const mhi_system *system, mhi_system_context *context,
-                                  uint32_t wanted, const double *x, const double *targets,
-                                  double *room, double *y, double *jacobian, mhi_by_parameter *by,
-                                  mhe_error *err) {
+                                  uint32_t wanted, int32_t k, const double *x,
+                                  const double *targets, double *room, double *y, double *jacobian,
+                                  mhi_by_parameter *by, mhe_error *err) {
     for (int32_t i = 0; i < signals->n_y && by != NULL; i++) {
         by[i] = (mhi_by_parameter){.slope = 1};
     }
     if (wanted >> s->control & 1) {
-        measure_emg(s, &signals->signal[s->control], targets, y, by);
+        measure_emg(s, &signals->signal[s->control], k, targets, y, by);
     }
     return wanted >> MHI_SIGNAL_MARKERS & 1
                ? measure_markers(s, &signals->signal[MHI_SIGNAL_MARKERS], system, context, x, room,
@@ -191,7 +233,8 @@ void mhi_parameters_fold(const mhi_parameters *s, int32_t n_x, int32_t n_p, cons
         for (int32_t j = 0; j < n_p; j++) {
             const int32_t of = s->setup.of_system[j];
             if (of >= 0) {
-                P[i * n + of] += of_system[i * n_p + j] * s->model[j];
+                P[i * n + of] +=
+                    of_system[i * n_p + j] * (is_moved(s, j) ? MHI_OFFSET_UNIT : s->model[j]);
             }
         }
     }

@@ -28,8 +28,8 @@ CONDITIONS = {
               "residual_torque: 0.02", "noise_time": 0.03},
     "noise": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0, "markers": 0, "cost": "emg_spread: 0.02, emg_value: 0.06, "
               "residual_torque: 0.02", "noise_time": 0.03},
-    "insertions": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0.003, "markers": 0, "cost": "emg_spread: 0.3, "
-                   "emg_value: 0.2, residual_torque: 0.2", "noise_time": 0.1},
+    "insertions": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0.003, "markers": 0, "cost": "emg_spread: 0.02, "
+                   "emg_value: 0.06, residual_torque: 0.02", "noise_time": 0.03},
     # The same data, EMG taken as the truth: what residual torques are left is made small.
     "plain": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0, "markers": 0, "cost": "emg_spread: 0, emg_value: 0.002, "
               "emg_floor: 0.001, residual_torque: 1", "noise_time": 0.03},
@@ -140,6 +140,7 @@ def spoil(draw, condition, out, folder):
         write(os.path.join(folder, motion[0] + "_emg.sto"), "\n".join(
             rows[:head + 1] + ["\t".join("%.8g" % x for x in row) for row in data]) + "\n")
     estimated = ["max_isometric_force, sd: 0.3", "optimal_fiber_length, sd: 0.1", "tendon_slack_length, sd: 0.05", "emg_gain, sd: 0.2"]
+    estimated += ["insertion, sd: 0.003"] * (how["insertions"] > 0)
     estimated += ["emg_shape, mean: -1, sd: 0.6"] * how["shape"] + ["marker_offset, sd: 0.01"] * (how["markers"] > 0)
     recordings = "".join("    - {markers: %s/markers.trc, emg: %s_emg.sto, reference: %s/reference.sto, hold_out: %s}\n" % (
         os.path.join(out, "motions", m[0]), m[0], os.path.join(out, "motions", m[0]), str(m[0] == "held_out").lower()) for m in MOTIONS)
@@ -163,9 +164,11 @@ def main():
             folder = os.path.join(out, "%s-%d" % (condition, draw))
             os.makedirs(folder, exist_ok=True)
             write(os.path.join(folder, "person.yaml"), spoil(draw, condition, out, folder))
-            subprocess.run([os.path.join(bin_dir, "mhe-calibrate"), "person.yaml", "--out", "person", "--quiet"], cwd=folder, check=True,
-                           stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-            with open(os.path.join(folder, "person", "calibration.json")) as file:
+            result = os.path.join(folder, "person", "calibration.json")
+            if not os.path.exists(result):  # those of a run that was broken off stay
+                subprocess.run([os.path.join(bin_dir, "mhe-calibrate"), "person.yaml", "--out", "person", "--quiet"], cwd=folder,
+                               check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+            with open(result) as file:
                 told = json.load(file)
             held = next(recording for recording in told["recordings"] if recording["held_out"])
             print("%s, draw %d: %s after %d iterations, %.1f s; forces %.1f -> %.2f N, angles %.3f -> %.3f deg" % (
