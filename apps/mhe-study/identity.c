@@ -55,6 +55,9 @@ static mhe_status add_plugin(seen *known, const mhe_plugin *plugin, mhi_text *ke
 static mhe_status add_parts(const study *s, seen *known, mhi_text *program, mhi_text *models,
                             mhe_error *err) {
     mhe_status status = add_once(known, "/proc/self/exe", program, err);
+    if (status == MHE_OK && s->keys.program != NULL) {
+        status = add_once(known, s->keys.program, program, err);
+    }
     for (int32_t i = 0; i < s->n_conditions && status == MHE_OK; i++) {
         const mhi_run *run = s->conditions[i].run;
         const mhe_plugin *const plugins[] = {run->model.plugin, run->muscle.plugin,
@@ -100,6 +103,9 @@ static void add_motions(const study *s, mhi_text *key) {
     for (int32_t i = 0; i < s->n_conditions; i++) {
         const condition *c = &s->conditions[i];
         const mhi_recording *m = c->motion;
+        if (m == NULL) { /* a program makes the trials */
+            continue;
+        }
         const size_t rows = (size_t)m->n_frames;
         const mhi_reference *r = &m->reference;
         const size_t n_q = (size_t)c->model->n_coordinates, n_m = (size_t)c->model->n_muscles;

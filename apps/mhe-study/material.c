@@ -90,7 +90,7 @@ mhe_status material_check(const study *s, mhi_registry *registry, mhe_error *err
     for (int32_t i = 0; i < n_steps; i++) {
         add_name(&names, steps[i].output);
     }
-    for (int32_t i = 0; i < s->n_conditions && status == MHE_OK; i++) {
+    for (int32_t i = 0; i < s->n_conditions && status == MHE_OK && s->keys.program == NULL; i++) {
         const char *wanted = s->conditions[i].reference;
         char hint[256];
         if (!holds(&names, wanted)) {
@@ -124,7 +124,7 @@ static mhe_status find_missing(const study *s, const char *dir, const char **mis
 
 mhe_status material_make(const study *s, const char *dir, int quiet, mhe_error *err) {
     const char *missing = NULL;
-    mhe_status status = find_missing(s, dir, &missing, err);
+    mhe_status status = s->keys.program != NULL ? MHE_OK : find_missing(s, dir, &missing, err);
     if (status != MHE_OK || missing == NULL) {
         return status;
     }
@@ -236,7 +236,7 @@ mhe_status material_load(study *s, const char *dir, const mhe_host *host, materi
         material_motion *motion = NULL;
         const char *path = NULL;
         status = find_model(m, c->run, host, &model, err);
-        if (status == MHE_OK) {
+        if (status == MHE_OK && s->keys.program == NULL) {
             c->model = model->description;
             status = motion_path(s, c->reference, dir, &m->arena, &path, err);
         }

@@ -55,7 +55,7 @@ static mhe_status find_muscle(const study *s, const mhe_description *d, const ch
 /* The condition whose motion is shown. */
 static const condition *example_condition(const study *s, const example *e) {
     const condition *c = &s->conditions[0];
-    for (int32_t i = s->n_conditions; i-- > 0 && e->reference != NULL;) {
+    for (int32_t i = s->n_conditions; i-- > 0 && e->reference != NULL && c->reference != NULL;) {
         c = strcmp(s->conditions[i].reference, e->reference) == 0 ? &s->conditions[i] : c;
     }
     return c;

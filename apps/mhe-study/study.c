@@ -7,6 +7,7 @@
 #include "io/slurp.h"
 #include "noise/config.h"
 #include "plugin/describe_options.h"
+#include "program.h"
 #include "study_private.h"
 
 #include <errno.h>
@@ -19,6 +20,9 @@ static const mhe_option options[] = {
                  "The estimator's config, as of mhe-run; its data section is not used."),
     MHE_OPT_PATH(study_keys, reference_config, 0,
                  "Config of mhe-sim reference; its outputs are motions that 'reference' can name."),
+    MHE_OPT_PATH(study_keys, program, 0,
+                 "A program that makes each trial in the place of the estimator; it needs no "
+                 "motions."),
     MHE_OPT_TEXTS(study_keys, reference_set, 0,
                   "'path.to.key=value' for mhe-sim reference's --set."),
     MHE_OPT_MAP(study_keys, motions, 0, "More motions: name and file, .sto with q, qdot, a and e."),
@@ -59,6 +63,7 @@ void study_describe(mhi_text *out) {
         "  noise          as in mhe-sim noise, for all conditions\n"
         "  keep_forces    [{factor: labels}]: conditions whose muscle forces are kept\n"
         "  report         tables and figures that mhe-study report makes\n");
+    program_describe(out);
 }
 
 /* ---- reading ---- */
@@ -249,7 +254,7 @@ mhe_status study_resolve(study *s, mhi_registry *registry, mhe_error *err) {
         if (status != MHE_OK) {
             return blame(s, c, registry, status, err);
         }
-        if (c->reference == NULL || *c->reference == '\0') {
+        if (s->keys.program == NULL && (c->reference == NULL || *c->reference == '\0')) {
             status = mhi_fail_at(err, MHE_E_CONFIG, s->tree, mhi_tree_root(s->tree),
                                  "no motion is given: a key 'reference', or a factor with it");
         }

@@ -71,6 +71,7 @@ typedef struct task {
 /* The plain keys at the top of the file. */
 typedef struct study_keys {
     const char *config, *reference_config, *reference;
+    const char *program; /* makes the trials; NULL: the estimator does */
     mhe_text_list reference_set;
     mhe_text_map motions;
     int32_t trials, seed, measure;

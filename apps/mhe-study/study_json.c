@@ -77,8 +77,8 @@ static void add_conditions(cJSON *root, const study *s) {
             cJSON_AddStringToObject(labels, s->factors[k].name, study_label(s, c, k));
         }
         cJSON_AddNumberToObject(entry, "trials", c->trials);
-        cJSON_AddStringToObject(entry, "reference", c->reference);
-        cJSON_AddStringToObject(entry, "motion", c->motion_path);
+        cJSON_AddStringToObject(entry, "reference", c->reference == NULL ? "" : c->reference);
+        cJSON_AddStringToObject(entry, "motion", c->motion_path == NULL ? "" : c->motion_path);
         cJSON_AddBoolToObject(entry, "forces", c->keep_forces);
         cJSON_AddNumberToObject(entry, "emg_level", c->noise.emg.level);
     }

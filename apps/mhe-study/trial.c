@@ -4,6 +4,7 @@
 #include "base/pi.h"
 #include "estimator/create.h"
 #include "measure.h"
+#include "program.h"
 #include <mhe/outbox.h>
 
 #include <math.h>
@@ -111,6 +112,10 @@ static int is_ours(mhe_status status) {
 
 mhe_status trial_run(const study *s, task what, const char *dir, const mhe_host *host,
                      const volatile int32_t *stop, trial_result *result, mhe_error *err) {
+    if (s->keys.program != NULL) {
+        *result = (trial_result){0};
+        return program_run(s, what, dir, stop, result, err);
+    }
     const condition *c = &s->conditions[what.condition];
     tracking t = {.condition = c, .stop = stop, .result = result};
     mhi_noise noise = c->noise;
@@ -172,8 +177,9 @@ void trial_cells(trial_result *r, mhi_text *cells) {
 void trial_timing(trial_result *r, mhi_text *cells) {
     static const double at[] = {0.5, 0.95, 0.99, 1};
     const tally *t = &r->tally;
-    const double first = t->n_solves > 0 ? t->solve_ms[0] : NAN;
-    const int32_t skip = t->n_solves > 1, n = t->n_solves - skip; /* the first starts cold */
+    const int32_t timed = t->solve_ms == NULL ? 0 : t->n_solves; /* a program tells no times */
+    const double first = timed > 0 ? t->solve_ms[0] : NAN;
+    const int32_t skip = timed > 1, n = timed - skip; /* the first starts cold */
     double *times = n > 0 ? t->solve_ms + skip : NULL, sum = 0;
     for (int32_t i = 0; i < n; i++) {
         sum += times[i];
@@ -194,6 +200,9 @@ void trial_timing(trial_result *r, mhi_text *cells) {
 mhe_status trial_check(const study *s, const condition *c, const mhe_host *host, mhe_error *err) {
     mhe_estimator *estimator = NULL;
     mhe_error why = {0};
+    if (s->keys.program != NULL) { /* which knows what it needs */
+        return MHE_OK;
+    }
     mhe_status status = mhi_estimator_create_on(c->run, c->model, host, &estimator, &why);
     mhe_estimator_close(estimator);
     if (status == MHE_OK) {

@@ -133,7 +133,18 @@ class Site:
                 ("Plugins", self.below("plugins")), ("Models", self.below("models")), ("Headers", self.below("headers")),
                 ("Project", ["contributing.md", "changelog.md"])]
 
+    def mend_theme(self):
+        """Debian's theme names two scripts that it does not hold: jQuery, which lies elsewhere in Debian and opens the menu of a
+        narrow window, and one of its own."""
+        scripts = self.work / "pages/js"
+        scripts.mkdir(parents=True, exist_ok=True)
+        for name, path in (("jquery-3.6.0.min.js", Path("/usr/share/javascript/jquery/jquery.min.js")),
+                           ("theme_extra.js", self.source / "docs/site/theme_extra.js")):
+            if path.exists():
+                (scripts / name).write_bytes(path.read_bytes())
+
     def build(self):
+        self.mend_theme()
         nav = "".join(f"  - {title}:\n" + "".join(f"    - {page}\n" for page in pages) for title, pages in self.nav() if pages)
         (self.work / "mkdocs.yml").write_text(
             f"site_name: Myohorizon\nsite_url: ''\nuse_directory_urls: false\ndocs_dir: pages\nsite_dir: html\n"
@@ -144,6 +155,10 @@ class Site:
                                str(self.work / "mkdocs.yml")], capture_output=True, text=True)
         if done.returncode != 0 or self.broken:
             sys.exit("\n".join(self.broken) + done.stdout + done.stderr)
+        search = self.work / "html/search"
+        (search / "search_index.js").write_text(f"const search_index = {(search / 'search_index.json').read_text()};\n")
+        (search / "main.js").write_text((self.source / "docs/site/search.js").read_text())
+        (search / "worker.js").unlink()
 
 
 def main(source, work, programs):

@@ -125,7 +125,17 @@ static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, cons
         work->pushed |= pushed;
         return string_between(route, w, ends[0], ends[1], last, work, string);
     }
-    return string_between(route, w, a->at, b->at, last, work, string);
+    double *hopeless = work->hopeless + 6 * w;
+    if (last == NULL && memcmp(hopeless, a->at, sizeof a->at) == 0 &&
+        memcmp(hopeless + 3, b->at, sizeof b->at) == 0) {
+        return WRAP_UNSOLVED;
+    }
+    int32_t state = string_between(route, w, a->at, b->at, last, work, string);
+    if (state == WRAP_UNSOLVED) { /* which takes longest to find out */
+        memcpy(hopeless, a->at, sizeof a->at);
+        memcpy(hopeless + 3, b->at, sizeof b->at);
+    }
+    return state;
 }
 
 /* Puts wrap w where it belongs in the course without it. 1: there it was. */
@@ -380,6 +390,7 @@ void course_find(const path_route *route, const path_pose *pose, const double *n
                  route_work *work) {
     for (int32_t w = 0; w < route->n_wraps; w++) {
         place_obstacle(&route->wraps[w], pose, work->obstacles + 12 * w);
+        work->hopeless[6 * w] = NAN;
     }
     if (course_try(route, pose, numbers, route->n_wraps > 1, work) != 0 && work->pushed) {
         (void)course_try(route, pose, numbers, 0, work);

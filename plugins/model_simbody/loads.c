@@ -15,7 +15,6 @@
 /* A load in ground. */
 typedef struct ground_load {
     int32_t link, axes, origin; /* links; -1: ground */
-    double axes_r[9], origin_r[9];
     double f[3], x[3], t[3];
 } ground_load;
 
@@ -26,20 +25,20 @@ static int32_t link_of(const tree *t, int32_t body) {
 static ground_load to_ground(const simbody_context *c, const mhe_load *load, const double *value) {
     ground_load out = {.link = link_of(c->tree, load->body),
                        .axes = link_of(c->tree, load->axes),
-                       .origin = link_of(c->tree, load->origin)};
-    double p[3];
-    if (load->axes < 0) { /* as most are: ground's axes */
-        static const double one[9] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-        memcpy(out.axes_r, one, sizeof one);
-        memcpy(out.f, value, sizeof out.f);
-        memcpy(out.t, value + 6, sizeof out.t);
-    } else {
-        bodies_pose(c, load->axes, out.axes_r, p);
-        rotate3(out.axes_r, value, out.f);
-        rotate3(out.axes_r, value + 6, out.t);
+                       .origin = link_of(c->tree, load->origin),
+                       .f = {value[0], value[1], value[2]},
+                       .x = {value[3], value[4], value[5]},
+                       .t = {value[6], value[7], value[8]}};
+    double r[9], p[3];
+    if (load->axes >= 0) { /* ground's axes stay as they are */
+        bodies_pose(c, load->axes, r, p);
+        rotate3(r, value, out.f);
+        rotate3(r, value + 6, out.t);
     }
-    bodies_pose(c, load->origin, out.origin_r, p);
-    place3(out.origin_r, p, value + 3, out.x);
+    if (load->origin >= 0) {
+        bodies_pose(c, load->origin, r, p);
+        place3(r, p, value + 3, out.x);
+    }
     return out;
 }
 
@@ -88,46 +87,64 @@ static void add_force(const simbody_context *c, int32_t link, const double *forc
     }
 }
 
-/* d tau/dq of one load. Joints that move it: those that carry its body, its axes or its origin.
- * That joint j moves the axis of a joint i beyond it counts as (S_j x S_i) . F = -S_i . (S_j x* F).
- */
+/* What turning joint j changes: it carries the load's body (`below`), its axes, its origin, or not.
+ * That it moves the axis of a joint i beyond it counts as (S_j x S_i) . F = -S_i . (S_j x* F). */
+static void turn_joint(const simbody_context *c, const ground_load *load, const double *force,
+                       int32_t j, int below, double *tau_q) {
+    const tree *t = c->tree;
+    const int with_axes = load->axes >= 0 && carries(t, j, load->axes);
+    const int with_origin =
+        load->origin == load->link ? below : load->origin >= 0 && carries(t, j, load->origin);
+    const double *axis = c->links[j].axis, slope = c->slopes[4 * j + 1];
+    double *column = tau_q + t->joints[j].coordinate, change[6] = {0}, turned[6];
+    int32_t i = load->link;
+    if (with_axes || with_origin) {
+        force_change(load, axis, with_axes, with_origin, change);
+    }
+    if (below) {
+        cross_force(axis, force, turned);
+        for (int k = 0; k < 6; k++) {
+            turned[k] = slope * (change[k] - turned[k]);
+        }
+        for (; i > j; i = t->joints[i].parent) {
+            column[t->joints[i].coordinate * t->n_q] +=
+                c->slopes[4 * i + 1] * dot6(c->links[i].axis, turned);
+        }
+        if (c->slopes[4 * j + 2] != 0) { /* the function's own slope */
+            column[t->joints[j].coordinate * t->n_q] += c->slopes[4 * j + 2] * dot6(axis, force);
+        }
+    }
+    for (; i >= 0 && (with_axes || with_origin); i = t->joints[i].parent) {
+        column[t->joints[i].coordinate * t->n_q] +=
+            slope * c->slopes[4 * i + 1] * dot6(c->links[i].axis, change);
+    }
+}
+
+/* d tau/dq of one load, by the joints that move it: those that carry its body, and where its axes
+ * or its origin are another body's, those that carry that one alone. */
 static void add_derivative(const simbody_context *c, const ground_load *load, const double *force,
                            double *tau_q) {
     const tree *t = c->tree;
-    for (int32_t j = 0; j < t->n_joints; j++) {
-        const int below = carries(t, j, load->link);
-        const int with_axes = load->axes >= 0 && carries(t, j, load->axes);
-        const int with_origin = load->origin == load->link ? below : carries(t, j, load->origin);
-        const int32_t column = t->joints[j].coordinate;
-        if (!below && !with_axes && !with_origin) {
-            continue;
-        }
-        double change[6], turned[6];
-        force_change(load, c->links[j].axis, with_axes, with_origin, change);
-        cross_force(c->links[j].axis, force, turned);
-        for (int k = 0; k < 6; k++) {
-            turned[k] = change[k] - turned[k];
-        }
-        int32_t i = load->link;
-        for (; i > j && below; i = t->joints[i].parent) {
-            tau_q[t->joints[i].coordinate * t->n_q + column] +=
-                c->slopes[4 * i + 1] * dot6(c->links[i].axis, turned) * c->slopes[4 * j + 1];
-        }
-        for (; i >= 0; i = t->joints[i].parent) {
-            tau_q[t->joints[i].coordinate * t->n_q + column] +=
-                c->slopes[4 * i + 1] * dot6(c->links[i].axis, change) * c->slopes[4 * j + 1];
-        }
-        if (below && c->slopes[4 * j + 2] != 0) { /* the function's own slope */
-            tau_q[column * t->n_q + column] += c->slopes[4 * j + 2] * dot6(c->links[j].axis, force);
+    for (int32_t j = load->link; j >= 0; j = t->joints[j].parent) {
+        turn_joint(c, load, force, j, 1, tau_q);
+    }
+    const int elsewhere = (load->axes >= 0 && load->axes != load->link) ||
+                          (load->origin >= 0 && load->origin != load->link);
+    for (int32_t j = 0; j < t->n_joints && elsewhere; j++) {
+        if (!carries(t, j, load->link)) {
+            turn_joint(c, load, force, j, 0, tau_q);
         }
     }
 }
 
 /* Columns 0 .. 8 of tau_l, `width` wide: by force, point and torque in their frames. */
-static void set_value_derivative(const simbody_context *c, const ground_load *load, int32_t width,
-                                 double *tau_l) {
+static void set_value_derivative(const simbody_context *c, const mhe_load *frames,
+                                 const ground_load *load, int32_t width, double *tau_l) {
+    double axes[9], origin[9], p[3];
+    bodies_pose(c, frames->axes, axes, p);
+    bodies_pose(c, frames->origin, origin, p);
     for (int32_t k = 0; k < 9; k++) {
-        const double *r = k / 3 == 1 ? load->origin_r : load->axes_r;
+        const double *r = k / 3 == 1 ? origin : axes;
         const double unit[3] = {r[k % 3], r[3 + k % 3], r[6 + k % 3]};
         double force[6] = {0};
         if (k / 3 == 0) {
@@ -167,7 +184,7 @@ mhe_status simbody_loads(void *context, const mhe_load *loads, int32_t n, const 
             add_derivative(c, &load, force, tau_q);
         }
         if (tau_l != NULL) {
-            set_value_derivative(c, &load, 9 * n, tau_l + 9 * i);
+            set_value_derivative(c, &loads[i], &load, 9 * n, tau_l + 9 * i);
         }
     }
     return MHE_OK;

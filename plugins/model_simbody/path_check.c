@@ -144,7 +144,8 @@ static mhe_status check_path(const mhe_description *d, const mhe_path *path, mhe
         always += path->points[k].kind != MHE_POINT_CONDITIONAL;
     }
     if (always == 0) {
-        return mhe_fail(err, MHE_E_INPUT, "path '%s': every point is conditional", path->name);
+        return mhe_fail(err, MHE_E_INPUT, "path '%s' (line %d): every point is conditional",
+                        path->name, (int)path->line);
     }
     for (int32_t w = 0; w < path->n_wraps; w++) {
         const mhe_path_wrap *wrap = &path->wraps[w];
@@ -156,8 +157,12 @@ static mhe_status check_path(const mhe_description *d, const mhe_path *path, mhe
                             path->name, (int)w + 1);
         }
         for (int32_t k = 0; k < w; k++) {
-            if (path->wraps[k].obstacle == wrap->obstacle) {
-                return mhe_fail(err, MHE_E_INPUT, "path '%s': it wraps twice around '%s'",
+            const mhe_path_wrap *other = &path->wraps[k];
+            int after = other->last >= 0 && wrap->first >= other->last;
+            int before = wrap->last >= 0 && other->first >= wrap->last;
+            if (other->obstacle == wrap->obstacle && !after && !before) {
+                return mhe_fail(err, MHE_E_INPUT,
+                                "path '%s': it wraps twice around '%s' between the same points",
                                 path->name, d->obstacles[wrap->obstacle].name);
             }
         }

@@ -247,6 +247,7 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->slopes, sizeof(double) * 12 * n_p},
                  {&out->obstacles, sizeof(double) * 12 * n_w},
                  {&out->tried, sizeof(double) * 6 * n_w},
+                 {&out->hopeless, sizeof(double) * 6 * n_w},
                  {&out->newton, sizeof(double) * 2 * n_w * (2 * n_w + 1)},
                  {&out->gradient, sizeof(double) * n},
                  {&out->hessian, sizeof(double) * n * n},

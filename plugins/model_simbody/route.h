@@ -90,6 +90,7 @@ typedef struct route_work {
     wrap_string *strings; /* [n_wraps], in ground */
     int32_t *state;       /* [n_wraps] of wrap_solve() */
     double *tried;        /* [n_wraps x 6]: the ends that these are of */
+    double *hopeless;     /* [n_wraps x 6]: ends between which none was found, NaN: none yet */
     int32_t *order;       /* [n_wraps]: those that may be on, in the order tried */
     int32_t n_order;
     int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */

@@ -65,7 +65,8 @@ static void place(rti_solver *s, block *b) {
     }
     place_point(b, shape, &s->here);
     place_point(b, shape, &s->trial);
-    double **const of_z[] = {&s->lower, &s->upper, &s->z_lower, &s->z_upper, &s->slope};
+    double **const of_z[] = {&s->lower, &s->upper,   &s->z_lower,       &s->z_upper,
+                             &s->slope, &s->first.w, &s->first.z_lower, &s->first.z_upper};
     for (size_t i = 0; i < sizeof of_z / sizeof of_z[0]; i++) {
         *of_z[i] = cut_doubles(b, z);
     }
@@ -76,6 +77,7 @@ static void place(rti_solver *s, block *b) {
     s->rest = cut_doubles(b, n_u * (size_t)shape->ld_z);
     s->joint = cut_doubles(b, (n_x + n_u) * (size_t)shape->ld_z);
     s->lambda = cut_doubles(b, x);
+    s->first.lambda = cut_doubles(b, x);
     s->weight = cut_doubles(b, x);
     s->gaps = cut_doubles(b, x);
     s->stage_cost = cut_doubles(b, n_stages);

@@ -67,16 +67,20 @@ typedef struct rti_solver {
     double *lower, *upper;              /* [size_z] of w */
     double *lambda, *z_lower, *z_upper; /* at `here` */
     double *slope, *gaps;               /* scratch [size_z], [size_x] */
-    double *result;                     /* [size_z] w of the last solve */
-    int32_t has_result;                 /* it gave one; 2: its covariances are known */
-    double *spread;                     /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
-    double *gain, *rest, *joint;        /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
+    struct {
+        double *w, *lambda, *z_lower, *z_upper;
+        double stationarity, feasibility, complementarity, open;
+    } first;                     /* result of a program whose step is looked at twice */
+    double *result;              /* [size_z] w of the last solve */
+    int32_t has_result;          /* it gave one; 2: its covariances are known */
+    double *spread;              /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
+    double *gain, *rest, *joint; /* scratch [n_u x ld_x], [n_u x ld_z], [n_z x ld_z] */
     rti_pool *pool;
     rti_worker *workers;              /* [n_workers of the problem] */
     double *stage_cost;               /* [N+1] of the last evaluation, not scaled */
     mhe_status *stage_status;         /* [N+1] */
     double scale;                     /* of the objective; 0 before the first solve */
-    double *weight;                   /* [size_x] of each gap in the merit function; this solve's */
+    double *weight;                   /* [size_x] of each gap in the merit of this solve */
     double penalty;                   /* the largest of them */
     double damping;                   /* Levenberg's, of the next step */
     int32_t warm;                     /* the multipliers are worth a start */
@@ -129,11 +133,22 @@ void rti_measure(rti_solver *s);
 #define RTI_LATE 3       /* the deadline passed before a step was found */
 #define RTI_CUT 4        /* it passed within the program, whose iterate was the last step */
 int32_t rti_step_full(rti_solver *s);
-/* `cut`: the step may end as RTI_CUT. */
-int32_t rti_step_globalised(rti_solver *s, int32_t cut);
 /* The last step of a real-time iteration: `here` moves, its stages stay those of the linearisation;
  * fills s->leap. */
 int32_t rti_leap_on(rti_solver *s);
+/* Its parts: the quadratic program at `here` -> s->qp.w, a step; QP_*. `from_last`: its start is
+ * the last program's result. */
+int32_t rti_program(rti_solver *s, int32_t from_last);
+#define RTI_HALVINGS 8                         /* of a step, at most */
+void rti_reach(rti_solver *s, double length);  /* trial.w = here.w + length * step, in the bounds */
+void rti_accept(rti_solver *s, double length); /* the trial point becomes `here` */
+#define RTI_PENALTY 1.5 /* of the gaps in an exact merit, times the largest multiplier */
+double rti_largest_multiplier(const rti_solver *s);
+int32_t rti_cut_short(rti_solver *s);    /* from a program that is not to be stepped on further */
+int32_t rti_is_over(const void *solver); /* deadline or work; asked before each iteration, too */
+
+/* search.c: the same by a step that must help. `cut`: it may end as RTI_CUT. */
+int32_t rti_step_globalised(rti_solver *s, int32_t cut);
 
 /* create.c */
 mhe_status rti_accepts(const mhe_stage_problem *problem, const void *config, mhe_error *err);

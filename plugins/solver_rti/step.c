@@ -2,19 +2,11 @@
 /* step.c: from one iterate to the next. */
 #include "rti.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
-#define MAX_HALVINGS 8
 #define MOST_LOOSE 1e3
-#define UNSETTLED 1000     /* one of so many variables, far from the solution */
-#define ARMIJO 1e-4        /* part of the predicted decrease that must come true */
-#define LEAST_DAMPING 1e-3 /* the first of Levenberg's, for controls of curvature 1 */
-#define MOST_DAMPING 1e9
-#define PENALTY 1.5 /* of the gaps, times the largest multiplier */
-/* Part of the least residual so far that a step may leave, whatever its merit. */
-#define NEARER 0.5
+#define UNSETTLED 1000 /* one of so many variables, far from the solution */
 
 int32_t rti_is_spent(rti_solver *s) {
     const mhe_solve_control *control = s->control;
@@ -37,7 +29,7 @@ void rti_tick(const rti_solver *s) {
 }
 
 /* Before each iteration of a program, too. */
-static int32_t is_late(const void *data) {
+int32_t rti_is_over(const void *data) {
     rti_solver *s = (rti_solver *)data; /* whose count of solutions is told */
     return rti_is_spent(s) || rti_is_late(s, 0);
 }
@@ -52,7 +44,7 @@ static double looseness(const rti_solver *s) {
 
 /* The quadratic program at `here` -> s->qp.w, a step; QP_*. Its bounds and dynamics are met
  * closely: what is left of them, times large multipliers, is noise in the merit function. */
-static int32_t solve_program(rti_solver *s, int32_t from_last) {
+int32_t rti_program(rti_solver *s, int32_t from_last) {
     qp *q = &s->qp;
     const size_t n = size_z(&s->shape);
     const double loose = looseness(s), tolerance = s->config->tolerance * loose;
@@ -62,7 +54,7 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
                               .max_iterations = s->config->max_qp_iterations,
                               .regularisation = 1e-9,
                               .unsettled = loose > 1 ? (int32_t)(n / UNSETTLED) : 0,
-                              .is_late = s->control != NULL ? is_late : NULL,
+                              .is_late = s->control != NULL ? rti_is_over : NULL,
                               .data = s};
     for (size_t i = 0; i < n; i++) {
         q->lower[i] = s->lower[i] - s->here.w[i];
@@ -82,7 +74,7 @@ static int32_t solve_program(rti_solver *s, int32_t from_last) {
 }
 
 /* trial.w = here.w + length * step, within the bounds. */
-static void reach(rti_solver *s, double length) {
+void rti_reach(rti_solver *s, double length) {
     for (size_t i = 0; i < size_z(&s->shape); i++) {
         const double w = s->here.w[i] + length * s->qp.w[i];
         s->trial.w[i] = smaller(s->upper[i], larger(s->lower[i], w));
@@ -130,7 +122,7 @@ static void accept_multipliers(rti_solver *s, double length) {
 }
 
 /* The trial point becomes `here`. */
-static void accept(rti_solver *s, double length) {
+void rti_accept(rti_solver *s, double length) {
     const rti_point old = s->here;
     s->here = s->trial;
     s->trial = old;
@@ -199,8 +191,7 @@ static double model_gaps(rti_solver *s, double *sum) {
     return largest;
 }
 
-/* The merit function is exact where its penalty is above this. */
-static double largest_multiplier(const rti_solver *s) {
+double rti_largest_multiplier(const rti_solver *s) {
     double largest = 0;
     for (size_t i = 0; i < size_x(&s->shape); i++) {
         largest = larger(largest, fabs(s->qp.lambda[i]));
@@ -213,15 +204,15 @@ static double largest_multiplier(const rti_solver *s) {
 static int32_t leap(rti_solver *s, int32_t result) {
     rti_leap *leap = &s->leap;
     *leap = (rti_leap){.solved = result == QP_SOLVED, .length = 1};
-    for (int32_t i = 0; i <= MAX_HALVINGS; i++, leap->length /= 2) {
-        reach(s, leap->length);
+    for (int32_t i = 0; i <= RTI_HALVINGS; i++, leap->length /= 2) {
+        rti_reach(s, leap->length);
         leap->first_gap = rti_first_gap(s, s->trial.w);
         if (s->failure != MHE_OK) {
             break;
         }
         if (isfinite(leap->first_gap)) {
             double sum;
-            const double penalty = PENALTY * largest_multiplier(s);
+            const double penalty = RTI_PENALTY * rti_largest_multiplier(s);
             leap->cost = model_cost(s);
             leap->left = model_gaps(s, &sum);
             if (result == QP_LATE &&
@@ -243,199 +234,35 @@ static int32_t leap(rti_solver *s, int32_t result) {
 }
 
 /* From a program that is not to be stepped on further. */
-static int32_t cut_short(rti_solver *s) {
+int32_t rti_cut_short(rti_solver *s) {
     return s->qp.iterations > 0 ? leap(s, QP_LATE) : RTI_LATE;
 }
 
 int32_t rti_leap_on(rti_solver *s) {
     rti_set_damping(s, &s->here, s->config->regularisation);
-    const int32_t result = solve_program(s, 0);
-    return result == QP_FAILED ? RTI_STUCK : result == QP_LATE ? cut_short(s) : leap(s, result);
+    const int32_t result = rti_program(s, 0);
+    return result == QP_FAILED ? RTI_STUCK : result == QP_LATE ? rti_cut_short(s) : leap(s, result);
 }
 
 int32_t rti_step_full(rti_solver *s) {
     rti_set_damping(s, &s->here, s->config->regularisation);
-    const int32_t result = solve_program(s, 0);
+    const int32_t result = rti_program(s, 0);
     if (result == QP_FAILED || result == QP_LATE) {
-        return result == QP_FAILED ? RTI_STUCK : cut_short(s);
+        return result == QP_FAILED ? RTI_STUCK : rti_cut_short(s);
     }
     double length = 1;
-    for (int32_t i = 0; i <= MAX_HALVINGS; i++, length /= 2) {
-        reach(s, length);
+    for (int32_t i = 0; i <= RTI_HALVINGS; i++, length /= 2) {
+        rti_reach(s, length);
         if (rti_evaluate(s, &s->trial, RTI_ALL)) {
-            accept(s, length);
+            rti_accept(s, length);
             return RTI_MOVED;
         }
         if (s->failure != MHE_OK) {
             break;
         }
-        if (is_late(s)) {
+        if (rti_is_over(s)) {
             return RTI_LATE;
         }
-    }
-    return RTI_STUCK;
-}
-
-/* ---- globalised by an exact penalty: merit = cost + sum weight |gap| ---- */
-
-static double merit(const rti_solver *s, const rti_point *point) {
-    return point->cost + rti_weighted_gaps(s, point);
-}
-
-/* Each gap has a penalty of its own, above its multiplier, that falls again by halves (Powell 1978,
- * doi:10.1007/BFb0067703). Multipliers of angles are a thousand times those of velocities and
- * activations: by the largest of all a step that bends a velocity counts as a thousand times what
- * it costs, and is refused down to its hundredth. Where bounds and dynamics contradict each other
- * multipliers say nothing, and all gaps count alike. */
-static double raise_weights(rti_solver *s, int32_t alike) {
-    const double largest = PENALTY * largest_multiplier(s);
-    s->penalty = 0;
-    for (size_t i = 0; i < size_x(&s->shape); i++) {
-        const double least = alike ? largest : 1.1 * fabs(s->qp.lambda[i]);
-        s->weight[i] = fmax(least, 0.5 * (s->weight[i] + least));
-        s->penalty = fmax(s->penalty, s->weight[i]);
-    }
-    return rti_weighted_gaps(s, &s->here);
-}
-
-/* Slope of the merit function along the step; raises the weights above the multipliers first. */
-static double merit_slope(rti_solver *s, int32_t alike) {
-    double slope = 0;
-    for (int32_t k = 0; k <= s->shape.N; k++) {
-        const double *step = row_z(&s->shape, s->qp.w, k);
-        for (int32_t i = 0; i < s->shape.n_z; i++) {
-            slope += s->here.stages[k].g[i] * step[i];
-        }
-        for (int32_t i = 0; i < s->shape.n_p; i++) {
-            slope += s->here.stages[k].d[i] * row_p(&s->shape, s->qp.w)[i];
-        }
-    }
-    return fmin(slope - raise_weights(s, alike), 0);
-}
-
-/* Is the trial point good enough after this length? Its merit must be known. */
-static int32_t is_better(const rti_solver *s, double length, double slope) {
-    const double before = merit(s, &s->here);
-    return merit(s, &s->trial) <= before + ARMIJO * length * slope + 1e-12 * (1 + fabs(before));
-}
-
-/* What of a difference of merits means nothing: the part of the cost that the program, solved to
- * its limits, leaves open, and rounding. */
-static double noise(const rti_solver *s) {
-    double size = 0;
-    for (size_t i = 0; i < size_z(&s->shape); i++) {
-        size += fabs(s->here.w[i]);
-    }
-    return s->qp.open + 10 * DBL_EPSILON * (fabs(s->here.cost) + s->penalty * size);
-}
-
-/* Close to the solution there is less to gain than noise, and the merit function is deaf. Is the
- * trial point, with the multipliers of the program, then much nearer to the optimality conditions
- * than any point of this solve? As their residual is halved each time, such steps come to an end.
- */
-static int32_t is_nearer(rti_solver *s, double slope) {
-    if (-slope > noise(s)) {
-        return 0;
-    }
-    const rti_residuals r =
-        rti_residuals_of(s, &s->trial, s->qp.lambda, s->qp.z_lower, s->qp.z_upper);
-    return rti_excess(&r) <= NEARER * s->least_excess;
-}
-
-/* A second look at a full step that was refused: the program once more with the gaps that the step
- * left (second-order correction: Fletcher 1982; the penalty function else refuses good steps along
- * curved constraints, the Maratos effect). The refused point's gaps are in trial. */
-static int32_t second_look(rti_solver *s, double slope) {
-    const qp_shape *shape = &s->shape;
-    const size_t bytes = sizeof(double) * (size_t)shape->n_x;
-    for (int32_t k = 0; k < shape->N; k++) {
-        double *b = s->here.stages[k].b;
-        memcpy(row_x(shape, s->gaps, k), b, bytes);
-        for (int32_t i = 0; i < shape->n_x; i++) {
-            b[i] += s->trial.stages[k].b[i];
-        }
-    }
-    const int32_t result = solve_program(s, 1);
-    for (int32_t k = 0; k < shape->N; k++) {
-        memcpy(s->here.stages[k].b, row_x(shape, s->gaps, k), bytes);
-    }
-    if (result == QP_LATE) {
-        return 0;
-    }
-    if (result == QP_SOLVED) {
-        reach(s, 1);
-        if (rti_evaluate(s, &s->trial, RTI_ALL) && is_better(s, 1, slope)) {
-            return 1;
-        }
-    }
-    (void)solve_program(s, 0); /* the first step again, to be shortened */
-    return 0;
-}
-
-/* Shortens the step until the merit function is better; the length, 0: none found. The point is
- * then known with derivatives. */
-static double search(rti_solver *s, double slope) {
-    double length = 0.5;
-    for (int32_t i = 0; i < MAX_HALVINGS; i++, length /= 2) {
-        reach(s, length);
-        if (rti_evaluate(s, &s->trial, RTI_DYNAMICS | RTI_COSTS) && is_better(s, length, slope)) {
-            return rti_evaluate(s, &s->trial, RTI_ALL) ? length : 0;
-        }
-        if (s->failure != MHE_OK || is_late(s)) {
-            return 0;
-        }
-    }
-    return 0;
-}
-
-/* Levenberg's term follows how well the linearisation predicted: none while full steps go well. */
-static void adapt_damping(rti_solver *s, double length) {
-    if (length == 1) {
-        s->damping = s->damping > LEAST_DAMPING ? s->damping / 4 : 0;
-    } else if (length < 0.25) {
-        s->damping = fmax(4 * s->damping, LEAST_DAMPING);
-    }
-}
-
-/* Tries the step of a solved program; the part of it that was gone, 0: none. */
-static double try_step(rti_solver *s, int32_t result) {
-    const double slope = merit_slope(s, result == QP_INFEASIBLE && s->shape.n_p == 0);
-    reach(s, 1);
-    const int32_t known = rti_evaluate(s, &s->trial, RTI_ALL);
-    if (known && (is_better(s, 1, slope) || is_nearer(s, slope))) {
-        return 1;
-    }
-    if (known && result == QP_SOLVED && !is_late(s) && second_look(s, slope)) {
-        return 1;
-    }
-    return s->failure == MHE_OK && !is_late(s) ? search(s, slope) : 0;
-}
-
-int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
-    while (s->damping <= MOST_DAMPING) {
-        rti_set_damping(s, &s->here, s->config->regularisation + s->damping);
-        const int32_t result = solve_program(s, 0);
-        if (result == QP_LATE) {
-            return cut && s->damping == 0 ? cut_short(s) : RTI_LATE;
-        }
-        const double before = s->gap_sum;
-        const double length = result == QP_FAILED ? 0 : try_step(s, result);
-        if (length > 0) {
-            accept(s, length);
-            adapt_damping(s, length);
-            const int32_t stays = rti_gap_sum(s, &s->here) > 0.9 * before;
-            return result == QP_INFEASIBLE && stays ? RTI_INFEASIBLE : RTI_MOVED;
-        }
-        if (s->failure != MHE_OK) {
-            break;
-        }
-        if (is_late(s)) {
-            return RTI_LATE;
-        }
-        if (result == QP_INFEASIBLE) {
-            return RTI_INFEASIBLE;
-        }
-        s->damping = fmax(10 * s->damping, LEAST_DAMPING);
     }
     return RTI_STUCK;
 }

@@ -22,8 +22,8 @@ def resident_kb():
 
 def test_opened_and_closed_without_growth():
     """MHE_CYCLES=10000 for the whole campaign: 24 s of processor time."""
-    n = int(os.environ.get("MHE_CYCLES", 300 if SANITIZED else 1000))
-    for _ in range(300):
+    n = int(os.environ.get("MHE_CYCLES", 100 if SANITIZED else 1000))
+    for _ in range(100 if SANITIZED else 300):
         myohorizon.Estimator(SMALL).close()
     gc.collect()
     before = resident_kb()
@@ -46,11 +46,11 @@ def test_what_is_forgotten_or_refused_leaves_nothing():
         for bad in ({**SMALL, "costs": ["mhe.cost.none"]}, {**SMALL, "model": {"file": "none.osim"}}):
             with pytest.raises(myohorizon.Error):
                 myohorizon.Estimator(bad)
-    for _ in range(30):
+    for _ in range(10 if SANITIZED else 30):
         use()
     gc.collect()
     before = resident_kb()
-    for _ in range(150):
+    for _ in range(40 if SANITIZED else 150):
         use()
     gc.collect()
     assert resident_kb() - before < (60000 if SANITIZED else 2000)
@@ -64,7 +64,7 @@ import myohorizon
 from myohorizon._library import ffi, lib
 e = myohorizon.Estimator({str(DEMO)!r})
 short = ffi.new("double[]", 2)
-lib.mhe_estimator_set_start(e._pointer, short, short, e._error)
+lib.mhe_estimator_measure(e._pointer, lib.mhe_estimator_find_channel(e._pointer, b"emg"), 0.0, short, e._error)
 """
     done = subprocess.run([sys.executable, "-B", "-c", code], capture_output=True, text=True)
     assert done.returncode != 0 and "heap-buffer-overflow" in done.stderr, done.stderr

@@ -9,7 +9,8 @@ from support import ARM19
 
 import myohorizon
 
-STREAM = {"config": ARM19 / "live.yaml", "sinks": [], "sources.0.speed": 0}  # the demo, as fast as it is taken
+STREAM = {"config": ARM19 / "live.yaml", "sinks": [], "sources.0.speed": 0,  # the demo, as fast as it is taken
+          "realtime.deadline_ms": 0}
 
 FOR_EVER = {"sources.0.speed": 1}  # by the clock, round and round
 

@@ -5,7 +5,7 @@ import inspect
 import re
 from pathlib import Path
 
-from support import SOURCE
+from support import DEMO, FAST, SOURCE
 
 import myohorizon
 
@@ -13,15 +13,56 @@ STUB = Path(myohorizon.__file__).parent / "__init__.pyi"
 
 
 def arguments(node):
+    """Of a stub: what `parameters` says of the code, {name: (kind, default)}."""
     a = node.args
-    names = [arg.arg for arg in a.posonlyargs + a.args + a.kwonlyargs]
-    return names + [f"*{a.vararg.arg}"] if a.vararg else names + ([f"**{a.kwarg.arg}"] if a.kwarg else [])
+    kinds = inspect.Parameter
+    plain = a.posonlyargs + a.args
+    found = {arg.arg: (kinds.POSITIONAL_OR_KEYWORD, None) for arg in plain}
+    found.update((arg.arg, (kinds.POSITIONAL_OR_KEYWORD, ast.literal_eval(value)))
+                 for arg, value in zip(plain[len(plain) - len(a.defaults):], a.defaults))
+    found.update((arg.arg, (kinds.KEYWORD_ONLY, ast.literal_eval(value) if value is not None else None))
+                 for arg, value in zip(a.kwonlyargs, a.kw_defaults))
+    if a.vararg:
+        found[a.vararg.arg] = (kinds.VAR_POSITIONAL, None)
+    if a.kwarg:
+        found[a.kwarg.arg] = (kinds.VAR_KEYWORD, None)
+    return found
 
 
 def parameters(function):
-    marks = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
-    found = [marks.get(p.kind, "") + name for name, p in inspect.signature(function).parameters.items()]
-    return sorted(found, key=lambda name: name.startswith("**"))
+    return {name: (p.kind, None if p.default is p.empty else p.default)
+            for name, p in inspect.signature(function).parameters.items()}
+
+
+def fields(node):
+    return {m.target.id for m in node.body if isinstance(m, ast.AnnAssign)}
+
+
+def documented(real):
+    """Names of a docstring's table and of its Attributes."""
+    doc = inspect.getdoc(real)
+    told = re.findall(r"^``(\w+)``", doc, re.M) + re.findall(r"``(\w+)`` ?(?:\(|and|,|of|\.|$)", doc)
+    attributes = doc.partition("Attributes:\n")[2].split("\n\n")[0]
+    for names in re.findall(r"^ {4}([\w, ]+):", attributes, re.M):
+        told += names.split(", ")
+    return set(told)
+
+
+def test_the_fields_of_the_stubs_are_those_of_the_code():
+    classes = {node.name: node for node in ast.parse(STUB.read_text()).body if isinstance(node, ast.ClassDef)}
+    quantities = set(myohorizon.Estimate.units)
+    slots = {name for name in myohorizon.Estimate.__slots__ if not name.startswith("_")}
+    assert fields(classes["Estimate"]) == quantities | slots | {"units"}
+    results = myohorizon.run(DEMO, **FAST)
+    with_residuals = {*results._tables, "residual"}
+    assert fields(classes["Results"]) == with_residuals | {name for name in vars(results) if not name.startswith("_")}
+    assert fields(classes["Table"]) == set(vars(results.table("q")))
+    for name, node in classes.items():  # the docstring names each of them, and nothing else
+        if name in ("Estimate", "Table", "Results", "Error", "Calibration"):
+            told = documented(getattr(myohorizon, name))
+            wanted = fields(node) - {"units"} - (quantities | {"name"} if name == "Results" else {"name"} if name == "Table" else
+                                                 {"q_sd", "activation_sd", "force_sd", "moment_sd"} if name == "Estimate" else set())
+            assert wanted - {"quality"} <= told, f"{name}: {wanted - told} are not explained"
 
 
 def test_the_stubs_are_those_of_the_code():

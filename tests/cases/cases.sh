@@ -222,6 +222,9 @@ verdict still doubtful 'repeat to the last digit: ELB.L'
 config zeros hinge.bioMod 'markers: zeros.trc'
 trc 100 'if (k < 20) for (i = 1; i <= 6; i++) c[i] = 0' > zeros.trc
 read_right zeros 0.005 '40 samples of a marker at exactly 0 0 0'
+config broken hinge.bioMod 'markers: broken.trc'
+trc 100 'if (k % 5 == 0) {c[1] = 1e30; c[5] = -3e12}' > broken.trc
+read_right broken 0.005 'samples of a marker are more than 100 km away'
 config beyond hinge.bioMod 'markers: beyond.trc'
 trc 100 'if (k % 3 == 0) more = "\t1\t2\t3"' > beyond.trc
 read_right beyond 0.005 'what is beyond is left out'

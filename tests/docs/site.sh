@@ -12,3 +12,4 @@ done
 grep -q 'marker_outlier' "$2/html/search/search_index.json" || { echo "FAILED: the search finds no key of the config" && exit 1; }
 grep -q 'muscles at full activation' "$2/html/faq.html" && [ "$(grep -c '<tr>' "$2/html/faq.html")" -gt 30 ] ||
     { echo "FAILED: the page of findings has none" && exit 1; }
+/usr/bin/python3 -B "$1/tests/docs/links.py" "$2/html" "$1/docs/site/links.txt"

@@ -4,7 +4,8 @@
 # report of a sanitizer. The inputs are short parts of shipped files, one of them spoilt at a time.
 #   mutated.sh PATH/mhe-run PATH/mutate SOURCE_DIR [COUNT [FIRST_SEED]]
 # A build with sanitizers and ten thousand runs: MHE_MUTATED_SECONDS=2 mutated.sh build/asan-ubsan/bin/mhe-run build/asan-ubsan/tests/mutate . 10000
-# What fails stays in ./mutated-SEED.* of the folder that it was called from.
+# What fails stays in ./mutated-SEED.* of the folder that it was called from. MHE_MUTATED_LOG names a file that gets a
+# line a run: seed, file, status, ms of processor time.
 set -u
 run=$1 mutate=$2 source=$3 count=${4:-150} first=${5:-1} home=$PWD
 case $mutate in /*) ;; *) mutate=$PWD/$mutate ;; esac
@@ -102,10 +103,24 @@ for set in config.yaml 'config.yaml --set data.markers=data.c3d' 'config.yaml --
     "$run" $set --quiet --out out > out.txt 2> err.txt < /dev/null || fail "$set, unspoilt: $(cat err.txt)"
     rm -rf out
 done
+# cpu_ms: processor time of all children until now, in ms
+cpu_ms() {
+    times > times.txt
+    { read -r line && read -r user system; } < times.txt
+    ms=0
+    for part in "$user" "$system"; do
+        part=${part%s}
+        thousandths=$(printf '%.3s' "${part#*.}00")
+        part=${part%.*}
+        ms=$((ms + (${part%m*} * 60 + ${part#*m}) * 1000 + 1$thousandths - 1000))
+    done
+}
 n_kinds=7
 seed=$first
 done=0
 refused=0
+longest=0
+longest_seed=none
 while [ $done -lt "$count" ]; do
     set -- config.yaml --quiet --out out
     case $((seed % n_kinds)) in
@@ -125,8 +140,12 @@ while [ $done -lt "$count" ]; do
     else
         set -- "$@" --set "$what=$spoilt"
     fi
+    cpu_ms && before=$ms
     (ulimit -S -t $seconds && exec "$run" "$@") > out.txt 2> err.txt < /dev/null
     status=$?
+    cpu_ms && took=$((ms - before))
+    [ $took -le $longest ] || { longest=$took && longest_seed=$seed; }
+    [ -z "${MHE_MUTATED_LOG:-}" ] || echo "$seed $file $status $took" >> "$MHE_MUTATED_LOG"
     if [ $status -gt 2 ] || grep -qE 'Sanitizer|runtime error' err.txt; then
         fail "seed $seed, $file: status $status: $(grep -E 'Sanitizer|runtime error|mhe-run:' err.txt | head -n 2)"
         cp "$spoilt" "$home/mutated-$seed.${file##*.}"
@@ -137,5 +156,5 @@ while [ $done -lt "$count" ]; do
     done=$((done + 1))
     seed=$((seed + 1))
 done
-echo "$done runs, $refused refused, $failed failed; went on:$(sort went.txt | uniq -c | tr -s ' \n' ' ')"
+echo "$done runs, $refused refused, $failed failed; longest $longest ms of processor time (seed $longest_seed); went on:$(sort went.txt | uniq -c | tr -s ' \n' ' ')"
 finish mutated

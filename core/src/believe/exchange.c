@@ -38,7 +38,7 @@ static int search_open(search *s, const mhi_system *system, const mhi_recording 
         return 0;
     }
     mhi_start_set_enough(s->start, FOUND);
-    mhi_work_begin(&s->work, mhi_start_affordable(s->start), 0);
+    mhi_work_begin(&s->work, mhi_start_affordable(s->start) / 2, 0);
     mhi_system_context_set_work(s->context, &s->work);
     return 1;
 }

@@ -215,17 +215,22 @@ static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junc
     }
 }
 
-#define FIRST_SD \
-    0.1 /* of a motion's first activations (fibres: 10 mm), about where they were found */
+/* Of a motion's first activations and fibre lengths (m), about where they were found. */
+#define FIRST_SD 0.1
+#define FIRST_LENGTH_SD 0.01
 
 /* Nothing tells the first activations of redundant muscles apart but what comes before: they stay
  * near those of the start. */
 static mhe_status hold_beginnings(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_system *f = mhi_system_face(p->system);
     double *weight = MHI_TAKE(&c->arena, double, f->n_x);
-    for (int32_t i = 2 * f->n_q; i < f->n_x && weight != NULL; i++) {
-        const double sd = i < 2 * f->n_q + f->n_d ? FIRST_SD : 0.01;
-        weight[i] = 1 / (sd * sd);
+    for (int32_t b = 0; b < f->layout->n_blocks && weight != NULL; b++) {
+        const mhe_block *block = mhe_layout_at(f->layout, b);
+        const double sd = block->structure == MHE_STRUCTURE_MUSCLE ? FIRST_LENGTH_SD : FIRST_SD;
+        const int32_t moves = strcmp(block->name, "q") == 0 || strcmp(block->name, "qdot") == 0;
+        for (int32_t i = 0; i < block->count && block->role == MHE_ROLE_STATE && !moves; i++) {
+            weight[block->first + i] = 1 / (sd * sd);
+        }
     }
     for (int32_t i = 0; i < c->plan.n_recordings && weight != NULL; i++) {
         const mhi_motion *m = &c->motions[i];

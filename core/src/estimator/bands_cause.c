@@ -15,13 +15,15 @@
  * as if activation and its control were that much larger together. */
 static void forces_of(const mhe_estimator *e, mhi_bands *b) {
     const mhi_gain_node *here = &b->gain.here;
-    const mhe_block *activation =
-        mhe_layout_find(mhi_ocp_problem(e->ocp)->layout, MHE_ROLE_STATE, "activation");
+    const mhe_layout *layout = mhi_ocp_problem(e->ocp)->layout;
+    const mhe_block *activation = mhe_layout_find(layout, MHE_ROLE_STATE, "activation");
+    const mhe_block *qdot = mhe_layout_find(layout, MHE_ROLE_STATE, "qdot");
+    const int32_t moved = qdot->first + qdot->count; /* q and qdot, which forces move */
     for (int32_t i = 0; i < b->n_x; i++) {
         for (int32_t m = 0; m < b->n_m; m++) {
             const double of_state =
                 activation == NULL ? 0 : here->A[i * b->n_x + activation->first + m];
-            here->force[i * b->n_m + m] = i < 2 * b->n_q ? of_state + here->B[i * b->n_u + m] : 0;
+            here->force[i * b->n_m + m] = i < moved ? of_state + here->B[i * b->n_u + m] : 0;
         }
     }
 }

@@ -8,6 +8,7 @@
 
 #define RATIOS_MAX 20000 /* more do not make the median better */
 #define SAME_SIZE 2.0    /* people differ by less from their model */
+#define FARTHEST 1e5     /* m: no marker is there, in whatever unit it is given */
 #define CLOSEST 0.01     /* m: closer pairs say more about the skin than about the unit */
 
 static double distance(const double *a, const double *b) {
@@ -84,6 +85,27 @@ void mhi_marker_settle_unit(mhi_recording *r, const mhe_description *d, double f
                        "%.300s: the markers of a segment are %.3g times as far apart as in the "
                        "model: is it of this person, are the labels right?",
                        path, scale);
+        host->log(host, MHE_LOG_WARNING, line);
+    }
+}
+
+void mhi_marker_leave_out_distant(mhi_recording *r, int32_t n_markers, const char *path,
+                                  const mhe_host *host) {
+    ptrdiff_t n = 0;
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * n_markers; i++) {
+        double *p = r->markers + 3 * i;
+        if (fabs(p[0]) > FARTHEST || fabs(p[1]) > FARTHEST || fabs(p[2]) > FARTHEST) {
+            p[0] = p[1] = p[2] = NAN;
+            n++;
+        }
+    }
+    if (n > 0) {
+        char line[512];
+        (void)snprintf(
+            line, sizeof line,
+            "%.300s: %td samples of a marker are more than %g km away: taken as gaps; is "
+            "the file whole?",
+            path, n, 1e-3 * FARTHEST);
         host->log(host, MHE_LOG_WARNING, line);
     }
 }

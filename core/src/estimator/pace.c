@@ -21,7 +21,7 @@
  * recordings take a third of it at most. Where the integrator needs more than PLAIN for an interval
  * (finer steps, states of muscles) it is more, up to so many times. Frames that come before a usual
  * one is known share it, and each may take SLICE of it in any case. */
-#define FIRST 60000.0
+#define FIRST 45000.0
 #define PLAIN 40.0
 #define DEARER 4.0
 #define SLICE 0.02

@@ -52,6 +52,7 @@ static mhe_status read_markers(mhi_recording *r, const mhi_run *run, const mhe_d
     }
     if (status == MHE_OK) {
         const double scale = fabs(run->transform.scale);
+        mhi_marker_leave_out_distant(r, d->n_markers, table->path, host);
         mhi_marker_settle_unit(r, d, scale > 0 ? scale : 1, table->path, host);
         for (ptrdiff_t i = 0; i < (ptrdiff_t)r->n_frames * d->n_markers; i++) {
             mhi_run_transform(run, 1, r->markers + 3 * i);

@@ -106,6 +106,19 @@ static void check_wraps(mhi_builder *b, const mhi_path_draft *path) {
     }
 }
 
+/* 1 where a wrap before this one has its obstacle and a piece between two points with it. */
+static int32_t wraps_again(const mhe_path *path, const mhe_path_wrap *wrap) {
+    for (int32_t k = 0; k < path->n_wraps && wrap->obstacle >= 0; k++) {
+        const mhe_path_wrap *other = &path->wraps[k];
+        const int32_t after_it = other->last >= 0 && wrap->first >= other->last;
+        const int32_t before_it = wrap->last >= 0 && other->first >= wrap->last;
+        if (other->obstacle == wrap->obstacle && !after_it && !before_it) {
+            return 1;
+        }
+    }
+    return 0;
+}
+
 static int32_t obstacle_number(const mhe_obstacle *obstacles, int32_t n, const char *name) {
     for (int32_t i = 0; i < n; i++) {
         if (strcmp(obstacles[i].name, name) == 0) {
@@ -151,6 +164,12 @@ static void place_path(mhi_builder *b, mhe_description *d, const mhi_places *pla
         wraps[out->n_wraps] = wrap->wrap;
         wraps[out->n_wraps].obstacle =
             obstacle_number(d->obstacles, d->n_obstacles, wrap->obstacle);
+        if (wraps_again(out, &wraps[out->n_wraps])) {
+            mhi_build_warn(b, wrap->line,
+                           "%s '%s' wraps around '%s' once more between the same points: left out",
+                           draft->what, draft->name, wrap->obstacle);
+            continue;
+        }
         out->n_wraps += wraps[out->n_wraps].obstacle >= 0;
     }
     if (draft->length != NULL) {

@@ -169,8 +169,10 @@ static void measure_marker(const double *offset, int32_t first, const double *bo
         }
     }
     for (int32_t j = 0; j < n_q && jacobian != NULL; j++) {
-        const double omega[3] = {body_q[j], body_q[n_q + j], body_q[2 * n_q + j]};
-        double turned[3];
+        double omega[3], turned[3];
+        for (int32_t a = 0; a < 3; a++) {
+            omega[a] = body_q[a * n_q + j];
+        }
         cross(omega, moved, turned);
         for (int32_t a = 0; a < 3; a++) {
             jacobian[a * n_q + j] += turned[a];

@@ -11,6 +11,7 @@
 #include <link.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 static mhe_status truncated(mhe_error *err) {
@@ -18,7 +19,8 @@ static mhe_status truncated(mhe_error *err) {
 }
 
 static mhe_status unreadable(mhe_error *err) {
-    return mhe_fail(err, MHE_E_PLUGIN, "cannot be read: %s", strerror(errno));
+    return mhe_fail(err, errno == ENOMEM ? MHE_E_MEMORY : MHE_E_PLUGIN, "cannot be read: %s",
+                    strerror(errno));
 }
 
 /* dlopen maps a file without asking whether it is whole and then dies of SIGBUS where it is not, so
@@ -85,6 +87,22 @@ static const char *link_error(const char *path) {
     return strncmp(text, path, n) == 0 && strncmp(text + n, ": ", 2) == 0 ? text + n + 2 : text;
 }
 
+/* Is that a lack of memory? The linker says it in many ways, as to a segment that it cannot map
+ * without the reason, which may also be that files of that disk are not to be run. */
+static int is_short_of_memory(const char *path, const char *why) {
+    static const char *const ways[] = {"out of memory", "cannot allocate",
+                                       "cannot map zero-fill pages", "cannot create cache"};
+    for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
+        if (strstr(why, ways[i]) != NULL) {
+            return 1;
+        }
+    }
+    struct statvfs disk;
+    return strstr(why, strerror(ENOMEM)) != NULL ||
+           (strstr(why, "failed to map segment") != NULL && statvfs(path, &disk) == 0 &&
+            (disk.f_flag & ST_NOEXEC) == 0);
+}
+
 typedef struct entry_call {
     mhe_plugin_entry_function entry;
     const mhe_library *library;
@@ -100,7 +118,7 @@ static mhe_status load(const char *path, const mhe_library **library, mhe_error 
     void *handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (handle == NULL) {
         const char *why = link_error(path);
-        return mhe_fail(err, strstr(why, strerror(ENOMEM)) ? MHE_E_MEMORY : MHE_E_PLUGIN,
+        return mhe_fail(err, is_short_of_memory(path, why) ? MHE_E_MEMORY : MHE_E_PLUGIN,
                         "cannot be linked: %.500s", why);
     }
     entry_call call = {0};

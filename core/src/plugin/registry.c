@@ -100,7 +100,8 @@ mhe_status mhi_registry_add_folder(mhi_registry *r, const char *path, mhe_error 
     char resolved[PATH_MAX];
     struct stat info;
     if (realpath(path, resolved) == NULL || stat(resolved, &info) != 0) {
-        return mhe_fail(err, MHE_E_CONFIG, "plugin folder '%s': %s", path, strerror(errno));
+        return mhe_fail(err, errno == ENOMEM ? MHE_E_MEMORY : MHE_E_CONFIG,
+                        "plugin folder '%s': %s", path, strerror(errno));
     }
     if (!S_ISDIR(info.st_mode)) {
         return mhe_fail(err, MHE_E_CONFIG, "plugin folder '%s' is not a folder", path);
@@ -117,7 +118,11 @@ mhe_status mhi_registry_add_folder(mhi_registry *r, const char *path, mhe_error 
  * is missing; a second mention is fine too. */
 static mhe_status add_standard(mhi_registry *r, const char *path, mhe_error *err) {
     char resolved[PATH_MAX];
-    if (realpath(path, resolved) == NULL) {
+    const int known = realpath(path, resolved) != NULL;
+    if (!known && errno == ENOMEM) {
+        return no_memory(err);
+    }
+    if (!known) {
         r->absent[r->n_absent++] = path;
         return MHE_OK;
     }

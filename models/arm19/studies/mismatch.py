@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What calibration is worth where the model is wrong: docs/study.md, "A wrong model, calibrated".
-
-    mismatch.py BIN_DIR OUT [--draws 1-10] [--conditions exact,noise,insertions,markers]
+"""What calibration is worth where the model is wrong: one trial of study-mismatch.yaml (docs/study.md).
 
 Makes four motions of arm19 with co-contraction (mhe-sim reference; 40 s), three to learn from and one held out. Each draw then
-spoils the model and the EMG, mhe-calibrate starts from the spoilt ones, and a line tells the forces of the held-out motion before
-and after. Seeds are the draws' numbers.
+spoils the model and the EMG, mhe-calibrate starts from the spoilt ones, and what is told are the errors of the held-out motion
+before and after. Seeds are the draws' numbers; what is in the study's folder already is not made again.
 """
 import argparse
+import contextlib
+import fcntl
 import json
 import math
 import os
@@ -22,34 +22,13 @@ USUAL = ([-0.5, -1.4, -0.6, 0.1], [0.3, -0.2, 0.4, 1.6])
 # name, seed, reaches, s, largest excitation that is asked for, range of the postures (rad)
 MOTIONS = [("slow", 1, 5, 8, 0.2, WIDE), ("brisk", 2, 8, 8, 0.35, WIDE), ("strong", 5, 8, 8, 0.45, WIDE),
            ("held_out", 13, 6, 6, 0.3, USUAL)]
-# What is wrong, and the noise that the costs are told: EMG as a share of its value, residual torques in N m.
-CONDITIONS = {
-    "exact": {"lengths": 1, "noise": 0, "shape": 0, "insertions": 0, "markers": 0, "cost": "emg_spread: 0.02, emg_value: 0.02, "
-              "residual_torque: 0.02", "noise_time": 0.03},
-    "noise": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0, "markers": 0, "cost": "emg_spread: 0.02, emg_value: 0.06, "
-              "residual_torque: 0.02", "noise_time": 0.03},
-    "insertions": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0.003, "markers": 0, "cost": "emg_spread: 0.02, "
-                   "emg_value: 0.06, residual_torque: 0.02", "noise_time": 0.03},
-    # The same data, EMG taken as the truth: what residual torques are left is made small.
-    "plain": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0, "markers": 0, "cost": "emg_spread: 0, emg_value: 0.002, "
-              "emg_floor: 0.001, residual_torque: 1", "noise_time": 0.03},
-    "markers": {"lengths": 0, "noise": 0, "shape": 0, "insertions": 0, "markers": 0.01, "cost": "emg_spread: 0.1, emg_value: 0.1, "
-                "residual_torque: 0.1", "noise_time": 0.3},
+# What is wrong; the noise that the costs are told stands in the study.
+ERRORS = {
+    "exact": {"lengths": 1, "noise": 0, "shape": 0, "insertions": 0, "markers": 0},
+    "noise": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0, "markers": 0},
+    "insertions": {"lengths": 1, "noise": 0.1, "shape": 1, "insertions": 0.003, "markers": 0},
+    "markers": {"lengths": 0, "noise": 0, "shape": 0, "insertions": 0, "markers": 0.01},
 }
-ESTIMATE = """model: {plugin: mhe.model.simbody, file: wrong.osim}
-muscle: {plugin: mhe.muscle.hill, curves: degroote2016}
-formulation: excitation
-horizon: {window: 7, ratio: 3}
-bounds: {residual_torques: true}
-integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03, activation_step: 3.4}
-costs: [{plugin: mhe.cost.emg-markers, markers: 0.001, markers_misfit: 0, %s}]
-data: {marker_outlier: 0}
-solver: {plugin: mhe.solver.rti, preset: robust, tolerance: 1e-4, max_iterations: 50}
-calibrate:
-  noise_time: %g
-  recordings:
-%s  parameters:
-%s"""
 
 
 def write(path, text):
@@ -91,9 +70,9 @@ def make_motions(bin_dir, out):
     subprocess.run([os.path.join(bin_dir, "mhe-sim"), "reference", "motions.yaml", "--out", "motions"], cwd=out, check=True)
 
 
-def spoil(draw, condition, out, folder):
-    """The model with wrong numbers, the EMG with gains, shape and noise; -> the config."""
-    r, how = random.Random(1000 + draw), CONDITIONS[condition]
+def spoil(draw, errors, out, folder):
+    """The model with wrong numbers, the EMG with gains, shape and noise; -> the recordings."""
+    r, how = random.Random(1000 + draw), ERRORS[errors]
     with open(ARM) as file:
         text = file.read()
     names = re.findall(r'<\w+Muscle name="([^"]+)"', text)
@@ -139,41 +118,58 @@ def spoil(draw, condition, out, folder):
                 row[j + 1] = max(0, value * (1 + how["noise"] * r.gauss(0, 1)))
         write(os.path.join(folder, motion[0] + "_emg.sto"), "\n".join(
             rows[:head + 1] + ["\t".join("%.8g" % x for x in row) for row in data]) + "\n")
-    estimated = ["max_isometric_force, sd: 0.3", "optimal_fiber_length, sd: 0.1", "tendon_slack_length, sd: 0.05", "emg_gain, sd: 0.2"]
-    estimated += ["insertion, sd: 0.003"] * (how["insertions"] > 0)
-    estimated += ["emg_shape, mean: -1, sd: 0.6"] * how["shape"] + ["marker_offset, sd: 0.01"] * (how["markers"] > 0)
-    recordings = "".join("    - {markers: %s/markers.trc, emg: %s_emg.sto, reference: %s/reference.sto, hold_out: %s}\n" % (
-        os.path.join(out, "motions", m[0]), m[0], os.path.join(out, "motions", m[0]), str(m[0] == "held_out").lower()) for m in MOTIONS)
-    return ESTIMATE % (how["cost"], how["noise_time"], recordings, "".join("    - {name: %s}\n" % p for p in estimated))
+    motions = os.path.join(out, "motions")
+    return "[%s]" % ", ".join("{markers: %s/markers.trc, emg: %s/%s_emg.sto, reference: %s/reference.sto, hold_out: %s}" % (
+        os.path.join(motions, m[0]), folder, m[0], os.path.join(motions, m[0]), str(m[0] == "held_out").lower()) for m in MOTIONS)
+
+
+@contextlib.contextmanager
+def alone(path):
+    """Other trials of the study wait."""
+    with open(path, "w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def calibrate(args, errors, plain):
+    """mhe-calibrate on a draw, once; what it told."""
+    name = "%s-%d" % ("plain" if plain else errors, args.trial + 1)
+    folder = os.path.join(args.out, "draws", name)
+    os.makedirs(folder, exist_ok=True)
+    with alone(os.path.join(args.out, "draws", "motions.lock")):
+        if not os.path.exists(os.path.join(args.out, "motions")):
+            make_motions(args.bin, args.out)
+    result = os.path.join(folder, "person", "calibration.json")
+    with alone(os.path.join(args.out, "draws", name + ".lock")):
+        if not os.path.exists(result):  # before and after are of one calibration
+            recordings = spoil(args.trial + 1, errors, args.out, folder)
+            settings = ["model.file=" + os.path.join(folder, "wrong.osim"), "calibrate.recordings=" + recordings] + args.set
+            command = [os.path.join(args.bin, "mhe-calibrate"), args.config, "--out", os.path.join(folder, "person"), "--quiet"]
+            for setting in settings:
+                command += ["--set", setting]
+            subprocess.run(command, check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    with open(result) as file:
+        return json.load(file)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("bin_dir")
-    parser.add_argument("out")
-    parser.add_argument("--draws", default="1-10")
-    parser.add_argument("--conditions", default=",".join(CONDITIONS))
+    for name in ("--condition", "--out", "--bin"):
+        parser.add_argument(name, required=True)
+    parser.add_argument("--trial", type=int, required=True)
+    parser.add_argument("--seed", type=int, help="not used: a draw is its number's, so that before and after have the same")
+    parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("config")
     args = parser.parse_args()
-    bin_dir, out = os.path.abspath(args.bin_dir), os.path.abspath(args.out)
-    os.makedirs(out, exist_ok=True)
-    if not os.path.exists(os.path.join(out, "motions")):
-        make_motions(bin_dir, out)
-    first, last = (int(x) for x in (args.draws + "-" + args.draws).split("-")[:2])
-    for condition in args.conditions.split(","):
-        for draw in range(first, last + 1):
-            folder = os.path.join(out, "%s-%d" % (condition, draw))
-            os.makedirs(folder, exist_ok=True)
-            write(os.path.join(folder, "person.yaml"), spoil(draw, condition, out, folder))
-            result = os.path.join(folder, "person", "calibration.json")
-            if not os.path.exists(result):  # those of a run that was broken off stay
-                subprocess.run([os.path.join(bin_dir, "mhe-calibrate"), "person.yaml", "--out", "person", "--quiet"], cwd=folder,
-                               check=True, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-            with open(result) as file:
-                told = json.load(file)
-            held = next(recording for recording in told["recordings"] if recording["held_out"])
-            print("%s, draw %d: %s after %d iterations, %.1f s; forces %.1f -> %.2f N, angles %.3f -> %.3f deg" % (
-                condition, draw, told["outcome"], told["iterations"], told["processor_seconds"], held["before"]["force_n"],
-                held["after"]["force_n"], held["before"]["q_deg"], held["after"]["q_deg"]), flush=True)
+    args.out, args.bin = os.path.abspath(args.out), os.path.abspath(args.bin)
+    labels = dict(part.split("=") for part in args.condition.split(" "))
+    told = calibrate(args, labels["errors"], labels["result"] == "plain")
+    held = next(recording for recording in told["recordings"] if recording["held_out"])
+    of = held["before" if labels["result"] == "before" else "after"]
+    print("converged %d\niterations_mean %d" % (told["outcome"] == "converged", told["iterations"]))
+    for name in ("q_deg", "force_n", "activation", "marker_mm"):
+        if of.get(name) is not None:
+            print("%s %.10g" % (name, of[name]))
 
 
 main()
