@@ -40,7 +40,7 @@ static int search_open(search *s, const mhi_system *system, const mhi_recording 
     }
     mhi_start_set_enough(s->start, FOUND);
     mhi_start_set_tries(s->start, TRIES);
-    mhi_work_begin(&s->work, mhi_start_affordable(s->start) / 2, 0);
+    mhi_work_begin(&s->work, mhi_start_affordable(s->start), 0);
     mhi_system_context_set_work(s->context, &s->work);
     return 1;
 }
@@ -90,6 +90,7 @@ int32_t mhi_exchange_find(const mhi_system *system, const mhi_recording *recordi
     }
     for (double now = fit(&s); n < most; now = out[n++].fixed) {
         mhi_exchange best = {.as_is = now, .fixed = INFINITY};
+        mhi_work_begin(&s.work, mhi_start_affordable(s.start), 0); /* for all pairs once */
         for (int32_t a = 0; a < s.n_k; a++) {
             for (int32_t b = a + 1; b < s.n_k && !mhi_work_spent(&s.work); b++) {
                 if (!suspect[a] && !suspect[b]) {
