@@ -305,8 +305,7 @@ static void tell(const tracking *t) {
         (void)mhe_config_get(t->setup->config, "data.reference", &reference, NULL);
         const char *truth = reference != NULL && *reference != '\0' ? reference : NULL;
         if (!page.failed &&
-            report_write(t->setup->out, mhe_config_name(t->setup->config), page.data, truth,
-                         t->summary.info.uncertainty, &why) != MHE_OK) {
+            report_write(t->setup->out, t->setup->config, page.data, truth, &why) != MHE_OK) {
             t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
         }
         mhe_free(reference);
