@@ -29,6 +29,19 @@ void add_escaped(mhi_text *out, const char *text) {
     add_escaped_part(out, text, strlen(text));
 }
 
+void add_escaped_json(mhi_text *out, const char *text) {
+    mhi_text_add(out, "\"");
+    for (; *text != '\0'; text++) {
+        const unsigned char c = (unsigned char)*text;
+        if (c < 32 || c == '<' || c == '>' || c == '&' || c == '"' || c == '\\') {
+            mhi_text_add(out, "\\u%04x", c);
+        } else {
+            mhi_text_add(out, "%c", c);
+        }
+    }
+    mhi_text_add(out, "\"");
+}
+
 void add_escaped_path(mhi_text *out, const char *text) {
     for (; *text != '\0'; text++) {
         const unsigned char c = (unsigned char)*text;

@@ -8,7 +8,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#define BAR 30
+#define BAR 30        /* signs at most */
+#define BESIDE_BAR 52 /* signs that the words take: the bar gives way to them */
 
 void progress_start(progress *p, int32_t total, int32_t before, int quiet) {
     *p = (progress){.enabled = !quiet && isatty(STDERR_FILENO),
@@ -51,20 +52,22 @@ void progress_update(progress *p, int32_t done, const char *format, ...) {
     p->drawn = measure_seconds();
     p->shown = 1;
     char bar[BAR + 1], left[32], words[160];
-    const int filled = (int)((int64_t)BAR * done / p->total);
-    for (int i = 0; i < BAR; i++) {
+    const int width = terminal_width(), room = width - 1 - BESIDE_BAR;
+    const int length = room > BAR ? BAR : room > 0 ? room : 0;
+    const int filled = (int)((int64_t)length * done / p->total);
+    for (int i = 0; i < length; i++) {
         bar[i] = i < filled ? '#' : '.';
     }
-    bar[BAR] = '\0';
+    bar[length] = '\0';
     write_time(progress_elapsed(p) * (p->total - done) / (done - p->before), left, sizeof left);
     va_list args;
     va_start(args, format);
     (void)vsnprintf(words, sizeof words, format, args);
     va_end(args);
     char line[BAR + 256];
-    (void)snprintf(line, sizeof line, "[%s] %3d %%  %s left  %s", bar,
-                   (int)(100.0 * done / p->total), left, words);
-    (void)fprintf(stderr, "\r\033[K%.*s", terminal_width() - 1, line);
+    (void)snprintf(line, sizeof line, "%s%s%s%3d %%  %s left  %s", length > 0 ? "[" : "", bar,
+                   length > 0 ? "] " : "", (int)(100.0 * done / p->total), left, words);
+    (void)fprintf(stderr, "\r\033[K%.*s", width - 1, line);
     (void)fflush(stderr);
 }
 

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mhe-live: estimates from streams as they come, and hands them on. */
 #include "console.h"
+#include "view.h"
+#include "view_serve.h"
 #include "words.h"
 
 #include <mhe/library.h>
@@ -24,7 +26,7 @@ static void on_signal(int number) {
 }
 
 typedef struct arguments {
-    const char *config, *record, *out;
+    const char *config, *record, *out, *view;
     words_list set, others;
     int32_t mode, quiet, trust;
     double seconds, wait;
@@ -43,6 +45,7 @@ static mhe_status read_seconds(const char *word, const char *value, void *target
 static const words_command commands[] = {
     {.name = "", .operand = "CONFIG.yaml", .what = "config file", .most = 1}};
 #define AT(field) offsetof(arguments, field)
+#define VIEW 1 /* mode */
 
 static const words_option options[] = {
     WORDS_SET("config", 0, AT(set)),
@@ -63,6 +66,12 @@ static const words_option options[] = {
      .kind = WORDS_OTHER,
      .at = AT(wait),
      .take = read_seconds},
+    {.name = "--view",
+     .value = "DIR",
+     .help = "shows a folder of results of mhe-run (or tables of mhe.sink.files) on the page",
+     .kind = WORDS_TEXT,
+     .at = AT(view),
+     .mode = VIEW},
     WORDS_OUT("folder of recordings, tables and maximal contractions; this one unless given", 0,
               AT(out)),
     WORDS_QUIET("summary", AT(quiet)),
@@ -74,11 +83,15 @@ static const words_program program = {
     .usage = "  mhe-live CONFIG.yaml [--record FILE.xdf] [--for SECONDS] [--wait SECONDS] [--out "
              "DIR]\n"
              "           [--set path.to.key=value]... [--quiet] [--trust]\n"
+             "  mhe-live [CONFIG.yaml] --view DIR\n"
              "  mhe-live --version | --help\n",
     .notes =
         "The config is that of mhe-run with two more sections: 'sources', where data come from, "
         "and\n'sinks', where estimates go. Ctrl-C ends the run; its summary is printed as "
-        "JSON.\nLines on the standard input: record-start, record-stop, mvc-start ELECTRODE, "
+        "JSON.\n--view prints the address of a page with the results, for browsers of this "
+        "machine; "
+        "its stick figure is of\nDIR/config.yaml, or of CONFIG.yaml. Lines on the standard input: "
+        "record-start, record-stop, mvc-start ELECTRODE, "
         "mvc-stop, "
         "label CAME=MODEL,\nstate, stop.\nExit status: 0 done; 1 the run failed; 2 the command "
         "line, the configuration or "
@@ -89,7 +102,8 @@ static const words_program program = {
     .n_options = sizeof options / sizeof options[0],
     .mode = AT(mode),
     .operand = AT(config),
-    .others = AT(others)};
+    .others = AT(others),
+    .modes_without = 1u << VIEW};
 
 static void on_log(const mhe_host *host, int32_t level, const char *text) {
     (void)host;
@@ -212,13 +226,63 @@ static mhe_status run(const arguments *w, mhe_error *err) {
     return status;
 }
 
+/* ---- results ---- */
+
+static volatile sig_atomic_t seen; /* enough of them */
+
+static void on_enough(int number) {
+    (void)number;
+    seen = 1;
+}
+
+static void tell_address(const char *address) {
+    (void)printf("%s\n", address);
+    (void)fflush(stdout);
+}
+
+/* The config of the figure: the one that is named, which must be right, else the one in the folder,
+ * without which the page has no figure. */
+static mhe_status read_figure(const arguments *w, const mhe_host *host, mhe_config **config,
+                              mhe_error *err) {
+    char path[4096];
+    const uint32_t flags = w->trust ? MHE_CONFIG_TRUST : 0;
+    if (w->config != NULL) {
+        return mhe_config_read(w->config, w->set.values, w->set.n, flags, host, config, err);
+    }
+    mhe_error why = {0};
+    const int n = snprintf(path, sizeof path, "%s/config.yaml", w->view);
+    if (n > 0 && (size_t)n < sizeof path && access(path, R_OK) == 0 &&
+        mhe_config_read(path, NULL, 0, flags, host, config, &why) != MHE_OK) {
+        (void)fprintf(stderr, "mhe-live: the page has no stick figure: %s\n", why.text);
+    }
+    return MHE_OK;
+}
+
+static mhe_status view(const arguments *w, mhe_error *err) {
+    const mhe_host host = {.size = sizeof host, .log = on_log, .service = no_service};
+    const struct sigaction action = {.sa_handler = on_enough};
+    mhe_config *config = NULL;
+    mhi_text page = {0};
+    mhe_status status = read_figure(w, &host, &config, err);
+    const view_setup setup = {.dir = w->view, .config = config};
+    status = status == MHE_OK ? view_compose(&setup, &page, err) : status;
+    mhe_config_close(config);
+    if (status == MHE_OK) {
+        (void)sigaction(SIGINT, &action, NULL);
+        (void)sigaction(SIGTERM, &action, NULL);
+        status = view_serve(page.data, page.length, tell_address, &seen, err);
+    }
+    mhi_text_free(&page);
+    return status;
+}
+
 int main(int argc, char **argv) {
     arguments a = {0};
     mhe_error err = {0};
     int32_t command = 0, outcome = WORDS_RUN;
     mhe_status status = words_parse(&program, argc, argv, &a, &command, &outcome, &err);
     if (status == MHE_OK && outcome == WORDS_RUN) {
-        status = run(&a, &err);
+        status = a.mode == VIEW ? view(&a, &err) : run(&a, &err);
     }
     words_free(&program, &a);
     return console_end("mhe-live", status, &err);

@@ -51,7 +51,8 @@ int32_t live_wait(live *l, mhe_estimator *estimator, const double *time, int32_t
         sleep_until(due);
     }
     const double now = measure_seconds();
-    while (k + 1 < n && l->begin + time[k + 1] - time[0] <= now) {
+    const int32_t kept = l->kept > 1 ? l->kept : 1;
+    while (k + kept < n && l->begin + time[k + kept] - time[0] <= now) {
         k++;
     }
     l->n_missed += k - l->next;

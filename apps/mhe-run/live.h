@@ -13,6 +13,8 @@ typedef struct live {
     double begin;    /* of the clock, when the first frame came */
     double deadline; /* from a frame to its estimate */
     int32_t next;    /* frame to wait for */
+    int32_t kept;    /* frames that wait while an estimate is made, as in a device's buffer: those
+                      * from one estimate to the next; 0 is taken as 1 */
     int32_t n_missed;
     int32_t has_priority; /* real-time priority, its own or given: other programs do not delay it */
     int32_t raised;       /* its own */
@@ -30,8 +32,8 @@ void live_raise(live *l);
 mhe_status live_open(live *l, int32_t n_frames, mhe_error *err);
 void live_close(live *l);
 
-/* Prepares the estimator, waits for the next frame at time[k] [n]; the newest there is, -1 at the
- * end. */
+/* Prepares the estimator, waits for the next frame at time[k] [n], -1 at the end. Where more than
+ * `kept` came since, the oldest are missed. */
 int32_t live_wait(live *l, mhe_estimator *estimator, const double *time, int32_t n);
 /* The frame's estimate is there. */
 void live_estimated(live *l);

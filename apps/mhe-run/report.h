@@ -3,13 +3,13 @@
 #ifndef REPORT_H
 #define REPORT_H
 
-#include "base/text.h"
+#include <mhe/config.h>
 
-/* Writes dir/report.html from the result files in dir (complete): `summary` (plain lines) and
- * pictures of joint angles, EMG against activation, forces, markers and solve times, beside the
- * truth in `reference` (a .sto with columns q_*, a_*, F_*; NULL: not known), and bands where
- * `with_bands`. [cold] */
-mhe_status report_write(const char *dir, const char *name, const char *summary,
-                        const char *reference, int with_bands, mhe_error *err);
+/* Writes dir/report.html from the result files in dir (complete): `summary` (plain lines), the
+ * posture with its muscles, and pictures of joint angles, EMG against activation, forces, markers
+ * and solve times, beside the truth in `reference` (a .sto with columns q_*, a_*, F_*; NULL: not
+ * known), with bands where they were estimated. [cold] */
+mhe_status report_write(const char *dir, mhe_config *config, const char *summary,
+                        const char *reference, mhe_error *err);
 
 #endif

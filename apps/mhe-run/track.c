@@ -41,6 +41,7 @@ static mhe_status open_live(tracking *t, mhe_error *err) {
     const double deadline = 1e-3 * number(t, "realtime.deadline_ms");
     t->live.deadline =
         deadline > 0 ? deadline : LIVE_SHARE * info->ratio / t->summary.recording.rate;
+    t->live.kept = info->ratio;
     char *node = NULL;
     mhe_status status = mhe_estimator_set_deadline(t->estimator, t->live.deadline, err);
     if (status == MHE_OK) {
@@ -287,6 +288,7 @@ static void tell(const tracking *t) {
     mhe_error why = {0};
     char *findings = NULL;
     summary_verdict(&t->summary, &text);
+    const size_t verdict = text.failed ? 0 : strlen(text.data);
     summary_lines(&t->summary, &text);
     if (mhe_findings_write(t->findings, &findings, &why) == MHE_OK) {
         mhi_text_add(&text, "%s", findings);
@@ -296,14 +298,14 @@ static void tell(const tracking *t) {
         (void)fputs(text.data, stdout);
         (void)printf("results in %s; open %s/report.html\n", t->setup->out, t->setup->out);
         mhi_text page = {0};
+        mhi_text_add(&page, "%.*s", (int)verdict, text.data);
         add_facts(t, &page);
-        mhi_text_add(&page, "%s", text.data);
+        mhi_text_add(&page, "%s", text.data + verdict);
         char *reference = NULL;
         (void)mhe_config_get(t->setup->config, "data.reference", &reference, NULL);
         const char *truth = reference != NULL && *reference != '\0' ? reference : NULL;
         if (!page.failed &&
-            report_write(t->setup->out, mhe_config_name(t->setup->config), page.data, truth,
-                         t->summary.info.uncertainty, &why) != MHE_OK) {
+            report_write(t->setup->out, t->setup->config, page.data, truth, &why) != MHE_OK) {
             t->setup->host->log(t->setup->host, MHE_LOG_WARNING, why.text);
         }
         mhe_free(reference);

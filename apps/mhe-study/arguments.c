@@ -69,13 +69,19 @@ static const words_option options[] = {
      .commands = SUBMIT,
      .kind = WORDS_LIST,
      .at = AT(option)},
+    {.name = "--trust",
+     .help = "the study may name a program that makes its trials, which then runs",
+     .commands = RUN | SUBMIT,
+     .kind = WORDS_FLAG,
+     .at = AT(trust),
+     .low = 1},
     WORDS_QUIET("progress bar", AT(quiet))};
 
 const words_program arguments_program = {
     .name = "mhe-study",
     .summary = "Runs an estimator on simulated recordings under many conditions, many times.",
     .usage = "  mhe-study run STUDY.yaml [--out DIR] [--workers N] [--set path.to.key=value]... "
-             "[--quiet]\n"
+             "[--quiet] [--trust]\n"
              "  mhe-study run --check STUDY.yaml [--set path.to.key=value]...\n"
              "  mhe-study report DIR [--quiet]\n"
              "  mhe-study submit STUDY.yaml --engine slurm [--out DIR] [--tasks N] [--workers N]\n"

@@ -20,7 +20,7 @@ typedef struct arguments {
     const char *engine;
     int32_t n_tasks;
     words_list option; /* of the engine, lent as they stand */
-    int32_t quiet, check;
+    int32_t quiet, check, trust;
 } arguments;
 
 extern const words_program arguments_program;

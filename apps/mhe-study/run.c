@@ -122,7 +122,7 @@ mhe_status run_study(const arguments *a, const mhe_host *host, mhe_error *err) {
     session s = {.lock = -1};
     char own[40];
     (void)snprintf(own, sizeof own, "%dof%d", (int)a->shard.i, (int)a->shard.n);
-    mhe_status status = session_read(&s, a->file, a->set.values, a->set.n, host, err);
+    mhe_status status = session_read_asked(&s, a, host, err);
     if (status == MHE_OK && a->check) {
         status = session_check(&s, err);
         if (status == MHE_OK) {

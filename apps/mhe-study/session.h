@@ -3,6 +3,7 @@
 #ifndef SESSION_H
 #define SESSION_H
 
+#include "arguments.h"
 #include "material.h"
 #include "rows.h"
 #include "study.h"
@@ -23,6 +24,8 @@ typedef struct session {
 /* Reads and checks the study as far as that goes without a results folder. */
 mhe_status session_read(session *s, const char *file, const char *const *set, int32_t n_set,
                         const mhe_host *host, mhe_error *err);
+/* The same as the command line asks for it: a program of the study's must be trusted. */
+mhe_status session_read_asked(session *s, const arguments *a, const mhe_host *host, mhe_error *err);
 /* Everything else that can be told without one: models, motions that are there, every condition's
  * estimator. */
 mhe_status session_check(session *s, mhe_error *err);

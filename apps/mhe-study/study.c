@@ -165,6 +165,15 @@ mhe_status study_read(const char *path, const char *const *set, int32_t n_set, s
     return status == MHE_OK ? check_conditions(s, err) : status;
 }
 
+mhe_status study_is_harmless(const study *s, mhe_error *err) {
+    const mhi_node *program = mhi_node_find(mhi_tree_root(s->tree), "program");
+    return s->keys.program == NULL
+               ? MHE_OK
+               : mhi_fail_at(err, MHE_E_CONFIG, s->tree, program,
+                             "program: %s would run with your rights; --trust says that it may",
+                             s->keys.program);
+}
+
 void study_free(study *s) {
     for (int32_t i = 0; i < s->n_conditions; i++) {
         mhi_run_free(s->conditions[i].run);

@@ -97,6 +97,8 @@ typedef struct study {
  * study_free, also after a failure. MHE_E_CONFIG, MHE_E_INPUT: "file:line: ...". */
 mhe_status study_read(const char *path, const char *const *set, int32_t n_set, study *s,
                       mhe_error *err);
+/* MHE_E_CONFIG where it names a program, which could do anything. */
+mhe_status study_is_harmless(const study *s, mhe_error *err);
 /* Reads every condition's config and noise: what a key or its plugin refuses is told with the line
  * of the study file. */
 mhe_status study_resolve(study *s, mhi_registry *registry, mhe_error *err);

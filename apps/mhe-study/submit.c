@@ -34,7 +34,7 @@ static mhe_status find_paths(session *s, const arguments *a, const char **progra
 static mhe_status submit(session *s, const arguments *a, const char **dir, const char **job,
                          mhe_error *err) {
     const char *program = NULL, *study_file = NULL;
-    const char **command = MHI_TAKE(&s->arena, const char *, 5 + 2 * a->set.n);
+    const char **command = MHI_TAKE(&s->arena, const char *, 6 + 2 * a->set.n);
     int32_t n = 0;
     mhe_status status =
         command == NULL ? no_memory(err) : find_paths(s, a, &program, &study_file, dir, err);
@@ -48,6 +48,9 @@ static mhe_status submit(session *s, const arguments *a, const char **dir, const
     for (int32_t i = 0; i < a->set.n; i++) {
         command[n++] = "--set";
         command[n++] = a->set.values[i];
+    }
+    if (a->trust) {
+        command[n++] = "--trust";
     }
     const cluster_job what = {.name = s->study.name,
                               .dir = *dir,
@@ -64,8 +67,7 @@ mhe_status submit_study(const arguments *a, const mhe_host *host, mhe_error *err
     session s = {.lock = -1};
     const char *dir = NULL, *job = NULL;
     mhe_status status = cluster_check_engine(a->engine, err);
-    status =
-        status == MHE_OK ? session_read(&s, a->file, a->set.values, a->set.n, host, err) : status;
+    status = status == MHE_OK ? session_read_asked(&s, a, host, err) : status;
     status = status == MHE_OK ? session_prepare(&s, a->out, a->quiet, err) : status;
     status = status == MHE_OK ? submit(&s, a, &dir, &job, err) : status;
     if (status == MHE_OK) {

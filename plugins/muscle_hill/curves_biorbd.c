@@ -6,7 +6,10 @@
  * and over 10 l_opt for "hillthelen".
  *
  * Kinks: fv of "hill" at s = 0 (slope of shortening taken there) and of "hillthelen" at s = 0
- * (slope of lengthening) and s = -1; fp at n = 0 ("hill", a jump) or n = 1 (others). */
+ * (slope of lengthening) and s = -1; fp at n = 0 ("hill", a jump) or n = 1 (others).
+ *
+ * Negative, a push, is the force of "hill" and "hilldegroote" alone, and only below s = -1: faster
+ * than 10 m/s, where biorbd's fv goes on as it does. */
 #include "hill.h"
 #include "shapes.h"
 

@@ -7,6 +7,10 @@
  * passive strain, 0.6 where not stated. Pennation at constant thickness; s is the fibre velocity
  * over vmax. No kinks.
  *
+ * A rigid tendon's fibre pushes below n = 0.2 (by 0.02 F_max at n = 0, no length that a fibre has)
+ * and faster than vmax, where the article's fv goes on below 0; with `damping` also where an idle
+ * muscle shortens.
+ *
  * Tendon: 0.2 (exp(k (x - 1)) - 1), k = ln 6 over its strain at F_max (0.049 where not stated), as
  * OpenSim has it. That curve goes on below x = 1 and would push with up to 0.2 F_max; here it bends
  * to 0 within a tenth of that strain about x = 1 (0.8 % of F_max there), and is a straight line

@@ -8,6 +8,8 @@
  * + 1.4 k s) / (1 + k s) above 0, k = 1.15 / (0.13 0.15). RigidTendonMuscle: fl, fp and fv are
  * functions of the file (fv 1 where it states none).
  *
+ * Without `damping` no force is negative unless a function of the file is.
+ *
  * Kinks: where fl is cut off at 0, and fv at 0 (slope of shortening) and -1. Pennation at constant
  * thickness. */
 #include "elastic.h"

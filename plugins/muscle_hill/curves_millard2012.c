@@ -3,7 +3,9 @@
  * curves of millard.h. Pennation at constant thickness; s is the fibre velocity over vmax. Twice
  * continuously differentiable; no kinks.
  *
- * A rigid tendon's fibre is not held from pushing: OpenSim sets a negative total to 0. */
+ * A rigid tendon's fibre is not held from pushing where an idle muscle shortens against its
+ * damping: OpenSim sets a negative total to 0, and where nothing changes any more no estimator
+ * finds back. */
 #include "millard.h"
 
 #include "elastic.h"

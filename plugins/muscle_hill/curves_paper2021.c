@@ -7,7 +7,11 @@
  *
  * Kinks: fv at s = 0, slope of shortening taken there; fp switches on where the *fibre* length
  * passes the tendon slack length (a jump, unless passive_ramp spreads it; the slopes are those of
- * either side). */
+ * either side).
+ *
+ * An idle muscle that shortens pushes: the damping acts beside the fibre and is not cut off, up to
+ * 0.1 F_max at 10 optimal lengths per second; below s = -1 fv is negative too. So the paper ran it.
+ */
 #include "hill.h"
 #include "shapes.h"
 

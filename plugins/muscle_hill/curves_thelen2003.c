@@ -11,7 +11,8 @@
  * in F and give F = x fv(u):
  *     u <= 0:  fv = (1 + u) / (1 - u / A_f)
  *     u > 0:   fv = (1 + k F_len u) / (1 + k u),   k = (2 + 2 / A_f) / (F_len - 1)
- * Below u = -1, faster than the fibre can shorten, the active force is 0.
+ * Below u = -1, faster than the fibre can shorten, the active force is 0; without `damping` no
+ * force is ever negative.
  *
  * Kinks: fv at u = 0 (slope of shortening taken there, 1 + 1 / A_f; lengthening has twice that) and
  * at u = -1 (slope of u > -1); fp at n = 1. Pennation at constant thickness; s is the fibre

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* server.c: the sockets, by libwebsockets. */
+#include "page.h"
 #include "web.h"
 
 #include <math.h>
@@ -158,7 +159,7 @@ static int begin_page(struct lws *wsi, const char *path) {
         (void)lws_return_http_status(wsi, HTTP_STATUS_NOT_FOUND, NULL);
         return -1;
     }
-    if (lws_add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8", web_page_size,
+    if (lws_add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8", mhe_page_size,
                                     &at, end) != 0 ||
         lws_add_http_header_by_name(wsi, (const uint8_t *)"content-security-policy:",
                                     (const uint8_t *)policy, (int)strlen(policy), &at, end) != 0 ||
@@ -171,8 +172,8 @@ static int begin_page(struct lws *wsi, const char *path) {
 
 static int continue_page(struct lws *wsi, struct download *d) {
     uint8_t buffer[LWS_PRE + 4096];
-    const size_t rest = web_page_size - d->sent, n = rest < 4096 ? rest : 4096;
-    memcpy(buffer + LWS_PRE, web_page + d->sent, n);
+    const size_t rest = mhe_page_size - d->sent, n = rest < 4096 ? rest : 4096;
+    memcpy(buffer + LWS_PRE, mhe_page + d->sent, n);
     const int last = n == rest;
     if (lws_write(wsi, buffer + LWS_PRE, n, last ? LWS_WRITE_HTTP_FINAL : LWS_WRITE_HTTP) !=
         (int)n) {

@@ -103,7 +103,4 @@ int web_write(web *w, web_client *c, size_t n, int text);
 int web_send_answer(web *w, web_client *c); /* c->answer, if any; 1: sent */
 void web_answer(web_client *c, char *text); /* takes the text over */
 
-extern const char web_page[]; /* the page, made from page/ when this is built */
-extern const size_t web_page_size;
-
 #endif

@@ -89,19 +89,6 @@ static double *FT_of(const kalman *f, int32_t k) {
 static double *C_of(const kalman *f, int32_t k) {
     return f->C + (ptrdiff_t)k * f->shape->n_x * f->ld_d;
 }
-static double *U_of(const kalman *f, int32_t k) {
-    return f->U + (ptrdiff_t)k * f->n * f->ld_d;
-}
-static double *W_of(const kalman *f, int32_t k) {
-    return f->W + (ptrdiff_t)k * f->n * f->ld_w;
-}
-static double *D_of(const kalman *f, int32_t k) {
-    return f->D + (ptrdiff_t)k * f->n * f->shape->ld_x;
-}
-static double *of_d(const kalman *f, double *rows, int32_t k) {
-    return rows + (ptrdiff_t)k * f->ld_d;
-}
-
 /* The simple states' part of a row of x, and of their controls of a row of u. */
 static const double *simple_x(const kalman *f, const double *rows, int32_t k) {
     return rows + (ptrdiff_t)k * f->shape->ld_x + f->n;
@@ -210,47 +197,6 @@ static void predict(kalman *f, const qp_stage *stage, int32_t k) {
     s->kernels->mirror(n, next, ld_x);
 }
 
-/* Sigma' of node k from Sigma. */
-static int32_t measure(kalman *f, const qp_stage *stage, const double *diagonal, int32_t k) {
-    const qp_shape *s = f->shape;
-    const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_d = f->ld_d, ld_w = f->ld_w;
-    const int32_t last = k == s->N, width = last ? n : n_x;
-    const double *d = diagonal + (ptrdiff_t)k * s->ld_z + s->n_u;
-    double *U = U_of(f, k), *W = W_of(f, k);
-    for (int32_t i = 0; i < n; i++) {
-        const double *from = stage->H + (s->n_u + i) * s->ld_z + s->n_u;
-        memcpy(U + i * ld_d + i, from + i, sizeof(double) * (size_t)(n - i));
-        memset(U + i * ld_d, 0, sizeof(double) * (size_t)i);
-        U[i * ld_d + i] += d[i];
-    }
-    if (!s->kernels->factor(n, n, U, ld_d, of_d(f, f->U_inverse, k))) {
-        return 0;
-    }
-    for (int32_t i = 0; i < n; i++) { /* blocks of four rows write beside the diagonal */
-        for (int32_t j = i / 4 * 4; j < i; j++) {
-            U[i * ld_d + j] = 0;
-        }
-    }
-    s->kernels->transpose(n, n, U, ld_d, f->L, ld_d);
-    s->kernels->product(n, n, n, 1, f->before, ld_x, f->L, ld_d, NULL, f->T, ld_d, 0);
-    s->kernels->product(n, n, n, 1, f->T, ld_d, f->L, ld_d, NULL, W, ld_w, 1);
-    for (int32_t i = 0; i < n; i++) {
-        W[i * ld_w + i] += 1;
-    }
-    s->kernels->product(n, width, n, 1, f->L, ld_d, f->before, ld_x, NULL, W + n, ld_w, 0);
-    if (!s->kernels->factor(n, n + width, W, ld_w, of_d(f, f->W_inverse, k))) {
-        return 0;
-    }
-    double *D = D_of(f, k);
-    if (!last) {
-        s->kernels->product(n_x, n_x, n, -1, W + n, ld_w, W + n, ld_w, f->before, f->after, ld_x,
-                            1);
-        s->kernels->mirror(n_x, f->after, ld_x);
-        memcpy(D, f->after, sizeof(double) * (size_t)(n * ld_x));
-    }
-    return 1;
-}
-
 /* Whether stage k would come to what it was: its controls' covariances and the measurement after
  * it. Takes note of the diagonals. */
 static int32_t is_kept(kalman *f, const double *diagonal, int32_t k) {
@@ -291,12 +237,12 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
     const int32_t first = first_changed(f, diagonal);
     f->known = 0;
     if (first > 0 && first < s->N) {
-        memcpy(f->after, D_of(f, first), sizeof(double) * (size_t)(f->n * s->ld_x));
+        memcpy(f->after, kalman_D_of(f, first), sizeof(double) * (size_t)(f->n * s->ld_x));
     }
     for (int32_t k = first; k < s->N; k++) {
         close_loop(f, k);
         predict(f, &stages[k], k);
-        if (!measure(f, &stages[k + 1], diagonal, k + 1)) {
+        if (!kalman_measure(f, &stages[k + 1], diagonal, k + 1)) {
             return 0;
         }
     }
@@ -341,7 +287,7 @@ static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, co
     for (int32_t k = 0; k < s->N; k++) {
         const double *beta = stages[k].by_control + n, *closed = simple_x(f, f->closed, k);
         const double *v = f->v + (ptrdiff_t)k * s->ld_z, *x = f->x + (ptrdiff_t)k * s->ld_x;
-        double *y = f->row, *m = f->next, *z = of_d(f, f->z, k + 1);
+        double *y = f->row, *m = f->next, *z = kalman_of_d(f, f->z, k + 1);
         memcpy(m, b + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)s->ld_x);
         for (int32_t j = 0; j < f->m; j++) {
             m[n + j] += beta[j] * v[u + j] + (k > 0 ? closed[j] * x[n + j] : 0);
@@ -357,12 +303,13 @@ static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, co
         const int32_t width = k + 1 == s->N ? n : s->n_x;
         memset(y, 0, sizeof(double) * (size_t)f->ld_w);
         memcpy(y, g + (ptrdiff_t)(k + 1) * s->ld_z + s->n_u, sizeof(double) * (size_t)n);
-        s->kernels->substitute(n, n, U_of(f, k + 1), ld_d, of_d(f, f->U_inverse, k + 1), y);
-        s->kernels->add(n, n, 1, U_of(f, k + 1), ld_d, z, y);
+        s->kernels->substitute(n, n, kalman_U_of(f, k + 1), ld_d,
+                               kalman_of_d(f, f->U_inverse, k + 1), y);
+        s->kernels->add(n, n, 1, kalman_U_of(f, k + 1), ld_d, z, y);
         memcpy(y + n, m, sizeof(double) * (size_t)width);
         memset(y + n + width, 0, sizeof(double) * (size_t)(f->ld_w - n - width));
-        s->kernels->substitute(n, n + width, W_of(f, k + 1), f->ld_w, of_d(f, f->W_inverse, k + 1),
-                               y);
+        s->kernels->substitute(n, n + width, kalman_W_of(f, k + 1), f->ld_w,
+                               kalman_of_d(f, f->W_inverse, k + 1), y);
         memset(z, 0, sizeof(double) * (size_t)ld_d);
         memcpy(z, y, sizeof(double) * (size_t)n);
         memcpy(f->x + (ptrdiff_t)(k + 1) * s->ld_x, y + n, sizeof(double) * (size_t)width);
@@ -377,16 +324,18 @@ static void sweep_back(kalman *f, const qp_stage *stages, double *w, double *lam
     memset(f->eta, 0, sizeof(double) * (size_t)s->ld_x);
     for (int32_t k = s->N; k > 0; k--) {
         const int32_t last = k == s->N;
-        double *x = row_z(s, w, k) + s->n_u, *y = of_d(f, f->z, k), *out = row_x(s, lambda, k - 1);
+        double *x = row_z(s, w, k) + s->n_u, *y = kalman_of_d(f, f->z, k),
+               *out = row_x(s, lambda, k - 1);
         memcpy(x, f->x + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)n);
         if (!last) {
-            s->kernels->add(n, n_x, 1, D_of(f, k), s->ld_x, f->eta, x);
-            s->kernels->add(n, n_x, 1, W_of(f, k) + n, f->ld_w, f->eta, y);
+            s->kernels->add(n, n_x, 1, kalman_D_of(f, k), s->ld_x, f->eta, x);
+            s->kernels->add(n, n_x, 1, kalman_W_of(f, k) + n, f->ld_w, f->eta, y);
         }
-        s->kernels->substitute_back(n, W_of(f, k), f->ld_w, of_d(f, f->W_inverse, k), y, f->row);
+        s->kernels->substitute_back(n, kalman_W_of(f, k), f->ld_w, kalman_of_d(f, f->W_inverse, k),
+                                    y, f->row);
         memset(f->lambda, 0, sizeof(double) * (size_t)ld_d);
         memcpy(f->lambda, f->eta, sizeof(double) * (size_t)n);
-        s->kernels->add_transposed(n, n, 1, U_of(f, k), ld_d, f->row, f->lambda);
+        s->kernels->add_transposed(n, n, 1, kalman_U_of(f, k), ld_d, f->row, f->lambda);
         memcpy(out, f->eta, sizeof(double) * (size_t)s->ld_x);
         memcpy(out, f->lambda, sizeof(double) * (size_t)n);
         const double *beta = stages[k - 1].by_control + n, *closed = simple_x(f, f->closed, k - 1);

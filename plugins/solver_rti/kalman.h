@@ -62,4 +62,21 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
 void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const double *b, double *w,
                   double *lambda);
 
+/* Blocks of a node. */
+static inline double *kalman_U_of(const kalman *f, int32_t k) {
+    return f->U + (ptrdiff_t)k * f->n * f->ld_d;
+}
+static inline double *kalman_W_of(const kalman *f, int32_t k) {
+    return f->W + (ptrdiff_t)k * f->n * f->ld_w;
+}
+static inline double *kalman_D_of(const kalman *f, int32_t k) {
+    return f->D + (ptrdiff_t)k * f->n * f->shape->ld_x;
+}
+static inline double *kalman_of_d(const kalman *f, double *rows, int32_t k) {
+    return rows + (ptrdiff_t)k * f->ld_d;
+}
+
+/* Sigma' of node k from Sigma (kalman_measure.c); 0: the cost is not positive definite. */
+int32_t kalman_measure(kalman *f, const qp_stage *stage, const double *diagonal, int32_t k);
+
 #endif

@@ -161,8 +161,7 @@ static double model_cost(rti_solver *s) {
             step[i] = to[i] - from[i];
             slope[i] = s->here.stages[k].g[i] - 0.5 * s->here.damping * step[i];
         }
-        shape->kernels->add_transposed(shape->n_z, shape->n_z, 0.5, s->here.stages[k].H,
-                                       shape->ld_z, step, slope);
+        qp_add_curvature(shape, &s->here.stages[k], 0.5, step, slope);
         for (int32_t i = 0; i < shape->n_z; i++) {
             cost += slope[i] * step[i];
         }

@@ -32,13 +32,13 @@ foreign() {
 }
 
 # mhe-run stands on the public headers as anybody's program does; base/ is no interface of the core.
-tell "mhe-run includes private headers" "$(foreign apps/common apps/mhe-run/*.[ch] apps/common/*.[ch])"
-# A plugin sees the public headers, its own files, and what plugins share (plugins/*.h).
+tell "mhe-run includes private headers" "$(foreign "apps/common page" apps/mhe-run/*.[ch] apps/mhe-live/*.[ch] apps/common/*.[ch])"
+# A plugin sees the public headers, its own files, what plugins share (plugins/*.h), and the page.
 for plugin in plugins/*/; do
     sources=$(find "$plugin" -name '*.[ch]' -not -path '*/tests/*' -not -name 'test_*')
     # Unquoted: file names without blanks.
     # shellcheck disable=SC2086
-    tell "$plugin includes what is not its own" "$(foreign "$plugin" $sources)"
+    tell "$plugin includes what is not its own" "$(foreign "$plugin page" $sources)"
 done
 tell "the core names plugins" "$(grep -rnE '"[^"]*mhe\.(model|muscle|force|cost|integrator|solver|source|sink)\.[a-z]' core/src |
     grep -vE '\.(hessian|jacobian)/[0-9]')"

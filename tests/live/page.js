@@ -133,6 +133,12 @@ setTimeout(() => fail("not done in 500 s"), 500000);
   must(signals.some(s => s[0] === "skeleton" && s[1] > 0) && signals.some(s => s[0] === "paths" && s[1] > 0), "no figure");
   fs.writeFileSync(path.join(folder, "page.json"), JSON.stringify({ signals, kept: await b.ask("kept.slice(-500)") }));
   phase("messages");
+  // a marker that came under another name is given its own, by the page's "Use"
+  await until("the list of what is missing", () => b.ask("/^1 labels/.test(document.getElementById('labels').textContent) && document.querySelectorAll('#pairs tr').length === 1"));
+  must(await b.ask("document.querySelector('#pairs td').textContent === 'STYLr' && [...document.querySelectorAll('#pairs option')].some(o => o.value === 'Elsewhere')"), "the list does not offer what came");
+  await b.ask("document.querySelector('#pairs select').value = 'Elsewhere'; document.querySelector('#pairs button').click(); 1");
+  await until("the label", () => b.ask("/^All labels were found/.test(document.getElementById('labels').textContent)"));
+  phase("label");
   // recording and a maximal contraction, by the page's own buttons
   await b.ask("document.getElementById('record').click(); 1");
   await until("the recording", () => b.ask("document.getElementById('record').getAttribute('aria-pressed') === 'true'"));

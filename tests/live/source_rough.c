@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* source_rough.c: recorded markers and EMG as a bad network brings them: late by chance, in another
  * order, not at all, with stamps that shake; in the middle the EMG is described anew, its channels
- * in another order. The same seed gives the same packets; when they come is the clock's. */
+ * in another order. With a `fault` the network is a good one, and that happens in the middle. The
+ * same seed gives the same packets; when they come is the clock's. */
+#include <math.h>
 #include <mhe/source.h>
 #include <stdlib.h>
 #include <string.h>
@@ -13,7 +15,7 @@
 #define SHAKE 0.002 /* s, of stamps */
 
 struct rough_config {
-    const char *markers, *emg;
+    const char *markers, *emg, *fault;
     int32_t seed;
     double speed;
 };
@@ -24,8 +26,12 @@ typedef struct packet {
     int64_t first;
 } packet;
 
+#define EXTRA 200 /* channels of "more" */
+
 typedef struct rough {
     struct rough_config config;
+    int32_t is_over;     /* the middle */
+    const char **labels; /* "more": those of the markers and EXTRA others */
     const mhe_recorded_service *service;
     const mhe_recorded *files[2];
     const char **turned; /* labels of the EMG from the middle on */
@@ -60,8 +66,17 @@ static void rough_destroy(void *self) {
     s->service->free(s->files[0]);
     s->service->free(s->files[1]);
     free(s->turned);
+    free(s->labels);
     free(s->packets);
     free(s);
+}
+
+static int has_fault(const rough *s, const char *fault) {
+    return strcmp(s->config.fault, fault) == 0;
+}
+
+static int is_rough(const rough *s) {
+    return has_fault(s, "");
 }
 
 static void lay(rough *s, int32_t stream, int32_t size) {
@@ -69,8 +84,9 @@ static void lay(rough *s, int32_t stream, int32_t size) {
     for (int64_t k = 0; k < of->n; k += size) {
         const int32_t n = k + size <= of->n ? size : (int32_t)(of->n - k);
         const double late = LATE * chance(s) * chance(s), lost = chance(s);
-        if (lost >= LOST) {
-            s->packets[s->n++] = (packet){of->stamp[k + n - 1] + late, stream, n, k};
+        if (lost >= LOST || !is_rough(s)) {
+            s->packets[s->n++] =
+                (packet){of->stamp[k + n - 1] + (is_rough(s) ? late : 0), stream, n, k};
         }
     }
 }
@@ -96,6 +112,13 @@ static mhe_status rough_create(const mhe_host *host, const void *config, void **
         for (int32_t i = 0; i < emg->n_channels; i++) {
             s->turned[i] = emg->labels[(i + 1) % emg->n_channels];
         }
+        const mhe_stream_info *markers = &s->files[0]->streams->about;
+        s->labels = calloc((size_t)markers->n_channels + EXTRA, sizeof *s->labels);
+        for (int32_t i = 0; i < markers->n_channels + EXTRA; i++) {
+            s->labels[i] = i < markers->n_channels
+                               ? markers->labels[i]
+                               : (const char *const[]){"Tool.x", "Tool.y", "Tool.z"}[i % 3];
+        }
         lay(s, 0, 1);
         lay(s, 1, PACKET);
         qsort(s->packets, (size_t)s->n, sizeof *s->packets, by_due);
@@ -113,34 +136,65 @@ static mhe_status rough_open(void *self, double deadline, mhe_error *err) {
 }
 
 static int32_t rough_count(const void *self) {
-    (void)self;
-    return 2;
+    return has_fault(self, "twice") ? 4 : 2;
 }
 
 static mhe_status rough_stream(const void *self, int32_t i, mhe_stream_info *out, mhe_error *err) {
     const rough *s = self;
     (void)err;
-    *out = s->files[i]->streams->about;
+    *out = s->files[i % 2]->streams->about;
     if (i == 1 && s->is_turned) {
         out->labels = s->turned;
+    }
+    if (i == 0 && s->is_over && has_fault(s, "more")) {
+        out->n_channels += EXTRA - EXTRA % 3;
+        out->labels = s->labels;
+        out->units = NULL;
+    }
+    if (i == 0 && s->is_over && has_fault(s, "fewer")) {
+        out->n_channels = 9;
+    }
+    if (i == 1 && s->is_over && has_fault(s, "fewer")) {
+        out->n_channels = 2;
+    }
+    if (i == 1 && s->is_over && has_fault(s, "rate")) {
+        out->rate /= PACKET;
     }
     return MHE_OK;
 }
 
-static void send_packet(rough *s, const packet *p, const mhe_source_taker *taker) {
+/* What the channel i of n_channels of the sample k says. */
+static double value_of(const rough *s, const packet *p, int32_t k, int32_t i) {
     const mhe_recorded_stream *of = s->files[p->stream]->streams;
-    const int32_t n_channels = of->about.n_channels, shift = p->stream == 1 && s->is_turned;
-    double *values = malloc(sizeof *values * (size_t)p->n * (size_t)n_channels), stamp[PACKET];
-    for (int32_t k = 0; k < p->n && values != NULL; k++) {
-        const double *from = of->values + (p->first + k) * n_channels;
-        stamp[k] = of->stamp[p->first + k] + SHAKE * (chance(s) - 0.5);
+    const int32_t n = of->about.n_channels, shift = p->stream == 1 && s->is_turned;
+    const double *from = of->values + (p->first + k) * n;
+    if (s->is_over && has_fault(s, "nan") && p->first + k < 2 * of->n / 3) {
+        return NAN;
+    }
+    return i < n ? from[(i + shift) % n] : 0.1;
+}
+
+static void send_packet(rough *s, const packet *p, int32_t stream, const mhe_source_taker *taker) {
+    const mhe_recorded_stream *of = s->files[p->stream]->streams;
+    mhe_stream_info about;
+    (void)rough_stream(s, p->stream, &about, NULL);
+    const int32_t n_channels = about.n_channels;
+    const int32_t n = s->is_over && has_fault(s, "rate") && p->stream == 1 ? 1 : p->n;
+    const double jump = !s->is_over                  ? 0
+                        : has_fault(s, "jump-ahead") ? 100
+                        : has_fault(s, "jump-back")  ? -3
+                                                     : 0;
+    double *values = malloc(sizeof *values * (size_t)n * (size_t)n_channels), stamp[PACKET];
+    for (int32_t k = 0; k < n && values != NULL; k++) {
+        stamp[k] = of->stamp[p->first + k] + jump;
+        stamp[k] += is_rough(s) ? SHAKE * (chance(s) - 0.5) : 0;
         for (int32_t i = 0; i < n_channels; i++) {
-            values[k * n_channels + i] = from[(i + shift) % n_channels];
+            values[k * n_channels + i] = value_of(s, p, k, i);
         }
     }
     const mhe_chunk chunk = {.size = sizeof chunk,
-                             .stream = p->stream,
-                             .n = p->n,
+                             .stream = stream,
+                             .n = n,
                              .received = now(),
                              .stamp = stamp,
                              .values = values};
@@ -148,6 +202,21 @@ static void send_packet(rough *s, const packet *p, const mhe_source_taker *taker
         taker->chunk(taker->data, &chunk);
     }
     free(values);
+}
+
+/* What happens in the middle; streams that are others from there on are described anew. */
+static void turn_over(rough *s, const mhe_source_taker *taker) {
+    s->is_over = 1;
+    if (is_rough(s)) {
+        s->is_turned = 1;
+        taker->event(taker->data, MHE_SOURCE_CHANGED, 1, "the EMG has its channels turned");
+    }
+    if (has_fault(s, "more") || has_fault(s, "fewer")) {
+        taker->event(taker->data, MHE_SOURCE_CHANGED, 0, "the markers are others");
+    }
+    if (has_fault(s, "rate") || has_fault(s, "fewer")) {
+        taker->event(taker->data, MHE_SOURCE_CHANGED, 1, "the EMG is another");
+    }
 }
 
 static mhe_status rough_read(void *self, double deadline, const mhe_source_taker *taker,
@@ -166,12 +235,14 @@ static mhe_status rough_read(void *self, double deadline, const mhe_source_taker
             (void)nanosleep(&pause, NULL);
             continue;
         }
-        if (!s->is_turned && s->next >= s->n / 2) {
-            s->is_turned = 1;
-            taker->event(taker->data, MHE_SOURCE_CHANGED, 1, "the EMG has its channels turned");
+        if (!s->is_over && s->next >= s->n / 2) {
+            turn_over(s, taker);
         }
         s->next++;
-        send_packet(s, p, taker);
+        send_packet(s, p, p->stream, taker);
+        if (has_fault(s, "twice")) {
+            send_packet(s, p, p->stream + 2, taker);
+        }
     }
     return MHE_OK;
 }
@@ -195,6 +266,7 @@ static const mhe_source_ops rough_ops = {.size = sizeof rough_ops,
 static const mhe_option rough_options[] = {
     MHE_OPT_PATH(struct rough_config, markers, 0, "Markers."),
     MHE_OPT_PATH(struct rough_config, emg, 0, "EMG."),
+    MHE_OPT_TEXT(struct rough_config, fault, 0, "", "What happens in the middle."),
     MHE_OPT_INT(struct rough_config, seed, 1, 0, 1000000, "1", "Of what goes wrong."),
     MHE_OPT_REAL(struct rough_config, speed, 1, 0.01, 1000, "1", "Times as fast."),
 };

@@ -5,6 +5,7 @@
 #include "live_rig.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define LIVE_CONFIG                                                                               \
@@ -93,6 +94,40 @@ static void markers_are_turned_into_the_models_frame(void **state) {
     mhe_free(rig.summary);
 }
 
+/* data.subject holds for streams as for files: of two persons with the same markers. */
+static mhe_status of_subject(const char *name, const char *subject) {
+    char command[800], source[600];
+    (void)snprintf(
+        command, sizeof command,
+        "sed '4{s/DELT/Anna:DELT/;s/ARMl/Bob:ARMl/;s/EPICl/Anna:EPICl/;s/EPICm/Anna:EPICm/"
+        ";s/LARMl/Anna:LARMl/;s/LARM_elb/Anna:LARM_elb/;s/STYLr/Anna:STYLr/"
+        ";s/STYLu/Anna:STYLu/}' %s/models/arm19/demo_markers.trc > %s/two.trc",
+        MHE_TEST_SOURCE_DIR, live_rig_folder());
+    assert_int_equal(system(command), 0);
+    (void)snprintf(
+        source, sizeof source,
+        "{plugin: mhe.source.recording, markers: %s/two.trc, emg: %s/models/arm19/"
+        "demo_emg.sto, speed: 0}]\ndata:\n  subject: %s\n  transform:\n    shift: [0, 0, 0",
+        live_rig_folder(), MHE_TEST_SOURCE_DIR, subject);
+    return run(name, source, NULL);
+}
+
+static void whose_markers(void **state) {
+    (void)state;
+    if (of_subject("anna", "Anna") != MHE_OK) {
+        fail_msg("%s", rig.err.text);
+    }
+    assert_int_equal(summary_says("found"), 7);
+    assert_non_null(strstr(rig.summary, "\"ARMl\"")); /* Bob's is nobody's of hers */
+    assert_non_null(strstr(rig.summary, "\"Bob:ARMl\""));
+    assert_true(summary_says("estimates") > 290);
+    mhe_free(rig.summary);
+    assert_int_equal(of_subject("carl", "Carl"), MHE_E_CONFIG);
+    if (strstr(rig.err.text, "has no subject 'Carl' (it has Anna, Bob)") == NULL) {
+        fail_msg("%s", rig.err.text);
+    }
+}
+
 static void refused(const char *sources, const char *said) {
     assert_true(run("refused", sources, NULL) < 0);
     if (strstr(rig.err.text, said) == NULL) {
@@ -116,6 +151,7 @@ int main(void) {
         cmocka_unit_test(recorded_and_repeated),
         cmocka_unit_test(twice_as_fast_by_the_clock),
         cmocka_unit_test(markers_are_turned_into_the_models_frame),
+        cmocka_unit_test(whose_markers),
         cmocka_unit_test(what_cannot_run),
     };
     return cmocka_run_group_tests(tests, NULL, live_rig_clean);

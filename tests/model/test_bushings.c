@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Bushings: their force is the slope of their energy, their damping takes what it should, every
  * derivative is exact, and on the neck model they are OpenSim's. */
+#include "json.h"
 #include "use.h"
 
 #include "io/model_file.h"
@@ -354,22 +355,6 @@ static void derivatives_are_exact(void **state) {
     close_rig(&r);
 }
 
-static cJSON *read_json(const char *path) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    assert_int_equal(fseek(file, 0, SEEK_END), 0);
-    const long size = ftell(file);
-    rewind(file);
-    char *text = malloc((size_t)size + 1);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, (size_t)size, file), size);
-    (void)fclose(file);
-    cJSON *json = cJSON_ParseWithLength(text, (size_t)size);
-    free(text);
-    assert_non_null(json);
-    return json;
-}
-
 static double member(const cJSON *object, const char *name) {
     const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
     return item == NULL ? 0 : item->valuedouble;
@@ -418,7 +403,7 @@ static void the_necks_bushings_are_opensims(void **state) {
     without = with;
     open_system(&without, "scale: 0");
     open_skeleton(&s, with.d);
-    cJSON *root = read_json(oracle);
+    cJSON *root = test_json(oracle);
     const cJSON *pose = NULL;
     double *body_q = calloc((size_t)(6 * with.d->n_bodies * with.face->n_q), sizeof *body_q);
     cJSON_ArrayForEach(pose, cJSON_GetObjectItemCaseSensitive(root, "poses")) {

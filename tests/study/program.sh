@@ -30,7 +30,10 @@ printf 'converged 1\niterations_mean 7\nforce_n %s.5\nq_deg 0.25\n' "$((10 * muc
 EOF
 chmod +x trial.sh
 
-"$study" run study.yaml --out out --workers 2 --quiet > stdout.txt 2> stderr.txt || fail "status $?: $(cat stderr.txt)"
+"$study" run study.yaml --out out --quiet > stdout.txt 2> stderr.txt
+[ $? = 2 ] && grep -q 'study.yaml:2: program: .*--trust' stderr.txt && [ ! -e calls.txt ] && [ ! -e out ] ||
+    fail "a program runs unasked: $(cat stderr.txt)"
+"$study" run study.yaml --trust --out out --workers 2 --quiet > stdout.txt 2> stderr.txt || fail "status $?: $(cat stderr.txt)"
 [ "$(wc -l < calls.txt)" = 6 ] || fail "called $(wc -l < calls.txt) times, not 6"
 grep -q -- '--condition amount=much --trial 1 --seed [0-9]* --out .*out --bin .* --set horizon.window=9 .*estimate.yaml$' calls.txt ||
     fail "not called as told: $(cat calls.txt)"
@@ -42,16 +45,16 @@ done
 printf '%s\n' "$rows" | grep -q '^much,2,failed' || fail "the trial that failed is not marked: $rows"
 
 # Rows that are there stay; another program is another study.
-"$study" run study.yaml --out out --quiet > stdout.txt 2>&1 || fail "second run: $(cat stdout.txt)"
+"$study" run study.yaml --trust --out out --quiet > stdout.txt 2>&1 || fail "second run: $(cat stdout.txt)"
 [ "$(wc -l < calls.txt)" = 6 ] || fail "trials were made again"
 echo "# changed" >> trial.sh
-"$study" run study.yaml --out out --quiet > stdout.txt 2>&1 && fail "another program went on in the same folder"
+"$study" run study.yaml --trust --out out --quiet > stdout.txt 2>&1 && fail "another program went on in the same folder"
 
 # An answer that is none is a failed trial, told with the line.
 printf '#!/bin/sh\necho force 3\n' > trial.sh
-"$study" run study.yaml --out wrong --quiet > stdout.txt 2>&1
+"$study" run study.yaml --trust --out wrong --quiet > stdout.txt 2>&1
 grep -q "no column 'force'" wrong/rows/* || fail "the wrong answer is not told: $(cat wrong/rows/* stdout.txt)"
 rm trial.sh
-"$study" run study.yaml --out none --quiet > /dev/null 2> stderr.txt
+"$study" run study.yaml --trust --out none --quiet > /dev/null 2> stderr.txt
 [ $? = 2 ] && grep -q trial.sh stderr.txt || fail "a program that is not there: $(cat stderr.txt)"
 finish program

@@ -16,7 +16,6 @@ for program in munged slurmctld slurmd sbatch squeue scontrol; do
 done
 . "$source/tests/support/script.sh"
 chmod 755 "$work"
-. "$source/tests/study/small.sh"
 pids=()
 # Ends what was started here, and nothing else.
 end_all() {
@@ -90,11 +89,27 @@ until_true 30 node_is_idle || skip "slurmd does not start: $(tail -n 1 slurmd.lo
 
 # ---- the study ----
 
-write_study 8 > small.yaml
-"$study" run small.yaml --out calm --quiet > out.txt 2> err.txt || fail "without Slurm: $(cat err.txt)"
-"$study" submit small.yaml --engine slurmm 2> err.txt && fail "an engine that is not known"
+# Trials from the third of each condition on wait for a gate, so that there are some to be done when the node dies.
+cat > trial.sh << END_OF_PROGRAM
+#!/bin/sh
+while [ "\$4" -gt 1 ] && [ ! -e "$work/gate" ]; do sleep 0.1; done
+echo converged 1
+echo force_n "\$6"
+END_OF_PROGRAM
+chmod +x trial.sh
+cat > small.yaml << END_OF_STUDY
+config: $source/models/arm19/studies/estimate.yaml
+program: trial.sh
+trials: 4
+factors: {amount: {values: [little, much]}}
+grids: [{amount: [little, much]}]
+END_OF_STUDY
+touch gate
+"$study" run small.yaml --trust --out calm --quiet > out.txt 2> err.txt || fail "without Slurm: $(cat err.txt)"
+rm gate
+"$study" submit small.yaml --trust --engine slurmm 2> err.txt && fail "an engine that is not known"
 grep -q "did you mean 'slurm'" err.txt || fail "an engine that is not known: $(cat err.txt)"
-"$study" submit small.yaml --engine slurm --out cluster --tasks 2 --option --time=20 > out.txt 2> err.txt ||
+"$study" submit small.yaml --trust --engine slurm --out cluster --tasks 2 --option --time=20 > out.txt 2> err.txt ||
     fail "submit: $(cat err.txt)"
 cat out.txt
 job=$(sed -n 's/^job \([0-9]*\):.*/\1/p' out.txt)
@@ -117,6 +132,7 @@ kill -9 "$node" "${victims[@]}"
 { wait "$node"; } 2> /dev/null
 killed=$(cat cluster/rows/*.rows | wc -l)
 [ -e cluster/results.csv ] && fail "it was over before it was killed"
+touch gate
 scontrol update nodename="$host" state=down reason=test || fail "the node cannot be set down"
 requeued() { squeue -h -j "$job" -o '%T' | grep -q PENDING; }
 until_true 30 requeued || fail "the tasks are not queued again: $(squeue -j "$job")"

@@ -1,8 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/columns.h"
 
-#include "base/text.h"
-
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -236,4 +234,32 @@ double mhi_column_mean(const mhi_table *table, int32_t column, double time, doub
         sum += isnan(value) ? 0 : value;
     }
     return n > 0 ? sum / n : mhi_column_at(table, column, time, 0);
+}
+
+/* ---- subjects ---- */
+
+int32_t mhi_label_is_of(const char *label, const char *subject) {
+    const size_t length = mhi_label_subject(label);
+    char name[256];
+    if (length == 0 || length >= sizeof name) {
+        return 0;
+    }
+    memcpy(name, label, length);
+    name[length] = '\0';
+    return strcmp(name, subject) == 0 || mhi_names_alike(name, subject);
+}
+
+void mhi_list_subjects(const mhi_table *table, mhi_text *out) {
+    for (int32_t i = 0; i < table->n_labels; i++) {
+        const size_t length = mhi_label_subject(table->labels[i]);
+        int32_t known = length == 0;
+        for (int32_t k = 0; k < i && !known; k++) {
+            known = mhi_label_subject(table->labels[k]) == length &&
+                    memcmp(table->labels[k], table->labels[i], length) == 0;
+        }
+        if (!known) {
+            mhi_text_add(out, "%s%.*s", out->length == 0 ? "" : ", ", (int)length,
+                         table->labels[i]);
+        }
+    }
 }

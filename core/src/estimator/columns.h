@@ -4,6 +4,7 @@
 #ifndef MHI_COLUMNS_H
 #define MHI_COLUMNS_H
 
+#include "base/text.h"
 #include "io/table.h"
 
 #include <mhe/host.h>
@@ -30,5 +31,10 @@ mhe_status mhi_columns_match(const mhi_table *table, const mhi_naming *naming,
 double mhi_column_at(const mhi_table *table, int32_t column, double time, int32_t hold);
 /* The mean of the rows from `time` on, `span` s long; where there is none, the value at `time`. */
 double mhi_column_mean(const mhi_table *table, int32_t column, double time, double span);
+
+/* Is "NAME:LABEL" of this subject (data.subject)? */
+int32_t mhi_label_is_of(const char *label, const char *subject);
+/* Appends the subjects of a table, "A, B". */
+void mhi_list_subjects(const mhi_table *table, mhi_text *out);
 
 #endif

@@ -76,15 +76,23 @@ static void put(mhi_rates *r, mhi_channel *c, int32_t k) {
     }
 }
 
-/* The posture by inverse kinematics, if one comes near. */
-static void find_posture(mhi_rates *r, int32_t k, const double *markers, const double *near,
-                         double outlier) {
-    double distance = NAN;
+/* Where to look for the posture of node k: straight on from the two before. */
+static void expect(mhi_rates *r, int32_t k, const double *times, const double *near) {
     memcpy(r->found, near, sizeof(double) * (size_t)r->n_q);
     for (int32_t i = 0; i < r->n_q && k > 0; i++) {
-        const double before = posture(r, k - 1)[i];
-        r->found[i] = isnan(before) ? near[i] : before;
+        const double last = posture(r, k - 1)[i];
+        const double move =
+            k > 1 ? (last - posture(r, k - 2)[i]) / (times[k - 1] - times[k - 2]) : NAN;
+        const double on = last + (times[k] - times[k - 1]) * move;
+        r->found[i] = !isnan(on) ? on : !isnan(last) ? last : near[i];
     }
+}
+
+/* The posture by inverse kinematics, if one comes near. */
+static void find_posture(mhi_rates *r, int32_t k, const double *times, const double *markers,
+                         const double *near, double outlier) {
+    double distance = NAN;
+    expect(r, k, times, near);
     const mhe_status status = (isfinite(r->nearest) ? mhi_start_posture : mhi_start_search)(
         r->start, markers, r->found, &distance, NULL);
     /* a frame that no posture comes near, where others fit, was not measured well */
@@ -100,7 +108,7 @@ void mhi_rates_take(mhi_rates *r, int32_t k, const double *times, const double *
         return;
     }
     forget(r, k);
-    find_posture(r, k, markers, near, outlier);
+    find_posture(r, k, times, markers, near, outlier);
     for (int32_t i = 0; i < r->n_q && angles != NULL; i++) {
         if (!isnan(angles[i])) {
             posture(r, k)[i] = angles[i];

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* recording_labels.c: whose columns are read, and what the config calls them. */
 #include "base/text.h"
+#include "estimator/columns.h"
 #include "estimator/recording_private.h"
 
 #include <stdlib.h>
@@ -30,33 +31,6 @@ static void keep_columns(mhi_table *table, const uint8_t *keep, int32_t width) {
     table->n_columns = n * width;
 }
 
-static int32_t is_of(const char *label, const char *subject) {
-    const size_t length = mhi_label_subject(label);
-    char name[256];
-    if (length == 0 || length >= sizeof name) {
-        return 0;
-    }
-    memcpy(name, label, length);
-    name[length] = '\0';
-    return strcmp(name, subject) == 0 || mhi_names_alike(name, subject);
-}
-
-/* "A, B": the subjects that there are. */
-static void list_subjects(const mhi_table *table, mhi_text *out) {
-    for (int32_t i = 0; i < table->n_labels; i++) {
-        const size_t length = mhi_label_subject(table->labels[i]);
-        int32_t known = length == 0;
-        for (int32_t k = 0; k < i && !known; k++) {
-            known = mhi_label_subject(table->labels[k]) == length &&
-                    memcmp(table->labels[k], table->labels[i], length) == 0;
-        }
-        if (!known) {
-            mhi_text_add(out, "%s%.*s", out->length == 0 ? "" : ", ", (int)length,
-                         table->labels[i]);
-        }
-    }
-}
-
 /* The columns of the subject lose its name, those of others go; a file that names no subject stays
  * as it is. */
 static mhe_status take_subject(mhi_table *table, int32_t width, const mhi_run *run,
@@ -69,11 +43,11 @@ static mhe_status take_subject(mhi_table *table, int32_t width, const mhi_run *r
     }
     int32_t n = 0;
     for (int32_t i = 0; i < table->n_labels; i++) {
-        const int32_t own = is_of(table->labels[i], subject);
+        const int32_t own = mhi_label_is_of(table->labels[i], subject);
         keep[i] = own || mhi_label_subject(table->labels[i]) == 0;
         n += own;
     }
-    list_subjects(table, &others);
+    mhi_list_subjects(table, &others);
     mhe_status status = MHE_OK;
     if (n == 0 && others.length > 0) {
         status = mhi_fail_at(

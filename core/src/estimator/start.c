@@ -183,12 +183,13 @@ static double propose(mhi_start *s, const double *q, double damping) {
 mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, double *rms,
                              mhe_error *err) {
     double damping = 1e-3;
+    int32_t known = 0; /* the normal equations are those of q */
     sums here = {0}, there = {0};
     for (int32_t i = 0; i < s->n_q; i++) {
         q[i] = clip(&s->description->coordinates[i], q[i]);
     }
     for (int iteration = 0; iteration < MAX_ITERATIONS; iteration++) {
-        mhe_status status = distances(s, measured, q, 1, &here, err);
+        mhe_status status = known ? MHE_OK : distances(s, measured, q, 1, &here, err);
         if (status != MHE_OK || here.n == 0) {
             *rms = NAN;
             return status;
@@ -197,8 +198,9 @@ mhe_status mhi_start_posture(mhi_start *s, const double *measured, double *q, do
         if (length < s->enough || mhi_system_context_spent(s->context)) {
             break;
         }
-        status = distances(s, measured, s->trial, 0, &there, err);
-        if (status == MHE_OK && there.weighted <= here.weighted) {
+        status = distances(s, measured, s->trial, 1, &there, err); /* taken, as a rule */
+        known = status == MHE_OK && there.weighted <= here.weighted;
+        if (known) {
             memcpy(q, s->trial, sizeof(double) * (size_t)s->n_q);
             here = there;
             damping = fmax(damping / 5, 1e-9);

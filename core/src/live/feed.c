@@ -7,9 +7,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define WAITING 256 /* frames that may wait for their EMG; more are no longer in any window */
-#define SETTLE 1.0  /* s that the first frame waits for envelopes at most */
-#define FORGET 1e-6 /* s a sample by which the guess of a clock gives way: it may drift */
+#define WAITING 256   /* frames that may wait for their EMG; more are no longer in any window */
+#define SETTLE 1.0    /* s that the first frame waits for envelopes at most */
+#define FORGET 1e-6   /* s a sample by which the guess of a clock gives way: it may drift */
+#define SET_BACK 0.5  /* s: packets that overtake each other step back less */
+#define SET_AHEAD 2.0 /* s beyond the time that has passed: a packet before was not so late */
+#define ALIKE 1.0     /* s between shifts of streams of one clock */
 
 mhe_status mhi_feed_open(mhi_feed *f, const mhe_host *host, const mhi_run *run,
                          const mhe_description *model, mhe_estimator *estimator, mhe_error *err) {
@@ -89,7 +92,7 @@ static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) 
         mhi_inlet_close(in);
     }
     *in = fresh;
-    f->guess[in - f->inlets] = INFINITY;
+    f->clocks[in - f->inlets] = (mhi_feed_clock){.guess = INFINITY, .received = NAN};
     return MHE_OK;
 }
 
@@ -281,15 +284,47 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
 
 /* What to add to stamps. Where it was never measured: samples are never early, so the least delay
  * seen is taken for none. */
-static double offset_of(mhi_feed *f, const mhi_inlet *in, const mhi_packet *p) {
-    double *guess = &f->guess[in - f->inlets];
+static double offset_of(mhi_feed_clock *c, const mhi_packet *p) {
     if (isfinite(p->offset)) {
         return p->offset;
     }
     const double least = p->received - p->stamp[p->n - 1];
-    *guess =
-        isfinite(*guess) && fabs(least - *guess) < 5 ? fmin(*guess + FORGET * p->n, least) : least;
-    return *guess;
+    c->guess = isfinite(c->guess) && fabs(least - c->guess) < 5
+                   ? fmin(c->guess + FORGET * p->n, least)
+                   : least;
+    return c->guess;
+}
+
+/* The shift that another stream of the source has by now, where it is nearly this one: streams of
+ * one clock stay aligned to the sample. */
+static double shift_of_source(const mhi_feed *f, const mhi_inlet *in, double shift) {
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        if (&f->inlets[i] != in && f->inlets[i].source == in->source &&
+            fabs(f->clocks[i].shift - shift) < ALIKE && f->clocks[i].shift != 0) {
+            return f->clocks[i].shift;
+        }
+    }
+    return shift;
+}
+
+/* A sender's clock that is set while it runs: its samples go on as they arrive. Packets that come
+ * late, or all at once after a pause, have stamps that go on by themselves. */
+static double follow_clock(mhi_feed *f, mhi_inlet *in, const mhi_packet *p) {
+    mhi_feed_clock *c = &f->clocks[in - f->inlets];
+    const double offset = offset_of(c, p), first = p->stamp[0] + offset;
+    const double step = first - c->time, passed = p->received - c->received;
+    if (isfinite(step) && isfinite(passed) && (step < -SET_BACK || step > passed + SET_AHEAD)) {
+        char text[300];
+        (void)snprintf(text, sizeof text,
+                       "stream '%.150s': its clock was set by %.3f s; it goes on as it arrives",
+                       in->name, step - passed);
+        warn(f, text);
+        f->n_clock_set++;
+        c->shift = shift_of_source(f, in, c->shift + passed - step);
+    }
+    c->received = p->received;
+    c->time = p->stamp[p->n - 1] + offset;
+    return offset + c->shift;
 }
 
 static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
@@ -298,7 +333,7 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
         return MHE_OK;
     }
     in->lost = 0;
-    const double offset = p->stamp == NULL ? 0 : offset_of(f, in, p);
+    const double offset = p->stamp == NULL ? 0 : follow_clock(f, in, p);
     const double period = in->rate > 0 ? 1 / in->rate : 0;
     mhe_status status = MHE_OK;
     int64_t before = f->n_frames;

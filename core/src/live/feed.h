@@ -17,6 +17,14 @@ typedef void (*mhi_feed_taker)(void *data, const mhe_estimate *estimate, double 
 /* Told of every frame that was pushed, estimated or not: what it was granted. */
 typedef void (*mhi_feed_pusher)(void *data, const mhe_grant *grant, double host_time);
 
+/* A sender's clock, of a stream. */
+typedef struct mhi_feed_clock {
+    double guess;    /* s: least (received - stamp), where no offset is known; inf: none yet */
+    double shift;    /* s to add, since the clock was set while it ran */
+    double received; /* s, of the last packet; NaN: there was none */
+    double time;     /* s on this machine, of its last sample, without the shift */
+} mhi_feed_clock;
+
 typedef struct mhi_feed {
     mhi_inlet_setup setup;
     mhe_estimator_info info;
@@ -26,19 +34,19 @@ typedef struct mhi_feed {
     void *data;
     int32_t n_inlets;
     mhi_inlet inlets[MHI_FEED_INLETS];
-    double guess[MHI_FEED_INLETS]; /* s: least (received - stamp), where no offset is known */
-    int32_t driver;                /* inlet whose samples are the frames; -1: none yet */
-    int32_t running;               /* 0: samples are passed over */
-    double begun;                  /* s of CLOCK_MONOTONIC, first sample of the driver; NaN: none */
-    double start;                  /* s of CLOCK_MONOTONIC, of the first frame */
-    double last;                   /* s since then, of the last frame */
-    double *waiting;               /* ring of frames without the electrodes' EMG */
+    mhi_feed_clock clocks[MHI_FEED_INLETS];
+    int32_t driver;  /* inlet whose samples are the frames; -1: none yet */
+    int32_t running; /* 0: samples are passed over */
+    double begun;    /* s of CLOCK_MONOTONIC, first sample of the driver; NaN: none */
+    double start;    /* s of CLOCK_MONOTONIC, of the first frame */
+    double last;     /* s since then, of the last frame */
+    double *waiting; /* ring of frames without the electrodes' EMG */
     int32_t n_waiting, first_waiting;
     int32_t repeats;         /* what comes is a recording that says what frames were granted */
     int32_t prepared;        /* since the last frame */
     int32_t behind;          /* frames are passed over: the run does not keep up */
     const double **channels; /* [info.n_channels] of a frame */
-    int64_t n_frames, n_estimates, n_out_of_order, n_restarts, n_passed_over;
+    int64_t n_frames, n_estimates, n_out_of_order, n_restarts, n_passed_over, n_clock_set;
     int64_t n_by_status[8];
 } mhi_feed;
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "live/inlet.h"
 
+#include "config/tree.h"
 #include "estimator/columns.h"
 
 #include <math.h>
@@ -73,6 +74,38 @@ static void without_axis(const char *label, int32_t per_label, char *out, size_t
     }
 }
 
+/* data.subject: his labels lose his name, those of others are set apart, as in files. Returns 1:
+ * his, -1: another's, 0: nobody's. */
+static int32_t without_subject(const mhi_run *run, char *label, size_t room) {
+    const char *subject = run->data.subject;
+    const size_t length = mhi_label_subject(label);
+    char name[512];
+    if (subject == NULL || *subject == '\0' || length == 0) {
+        return 0;
+    }
+    const int32_t own = mhi_label_is_of(label, subject);
+    if (own) {
+        (void)snprintf(name, sizeof name, "%s", label + length + 1);
+    } else {
+        (void)snprintf(name, sizeof name, "(%.*s) %s", (int)length, label, label + length + 1);
+    }
+    (void)snprintf(label, room, "%s", name);
+    return own ? 1 : -1;
+}
+
+static mhe_status no_subject(const mhi_inlet_setup *s, const mhi_stream *about, mhe_error *err) {
+    const mhi_table came = {.labels = about->labels, .n_labels = about->n_channels};
+    const mhi_run *run = s->run;
+    mhi_text others = {0};
+    mhi_list_subjects(&came, &others);
+    const mhe_status status = mhi_fail_at(
+        err, MHE_E_CONFIG, run->tree, mhi_node_find(mhi_tree_root(run->tree), "data"),
+        "data.subject: stream '%.100s' has no subject '%s' (it has %.300s)", about->name,
+        run->data.subject, others.failed || others.data == NULL ? "others" : others.data);
+    mhi_text_free(&others);
+    return status;
+}
+
 static mhe_status make_labels(const mhi_inlet_setup *s, const mhi_stream *about, labels *l,
                               mhe_error *err) {
     const int32_t per_label = about->kind == MHE_STREAM_MARKERS ? 3 : 1;
@@ -81,10 +114,14 @@ static mhe_status make_labels(const mhi_inlet_setup *s, const mhi_stream *about,
     l->came = calloc((size_t)about->n_channels + 1, sizeof *l->came);
     l->table.path = strdup(about->name);
     const int has_room = l->names != NULL && l->came != NULL;
+    int32_t n_own = 0, n_others = 0;
     for (int32_t i = 0; has_room && i + per_label <= about->n_channels; i += per_label) {
         char name[512], came[512];
         without_axis(about->labels[i], per_label, name, sizeof name);
         without_axis(about->came[i], per_label, came, sizeof came);
+        const int32_t whose = without_subject(s->run, name, sizeof name);
+        n_own += whose > 0;
+        n_others += whose < 0;
         l->names[l->n] = strdup(renamed(s->run, name));
         l->came[l->n] = strdup(came);
         const int whole = l->names[l->n] != NULL && l->came[l->n] != NULL;
@@ -96,7 +133,10 @@ static mhe_status make_labels(const mhi_inlet_setup *s, const mhi_stream *about,
     l->table.labels = l->names;
     l->table.n_labels = l->n;
     l->table.n_columns = l->n * per_label;
-    return !has_room || l->table.path == NULL ? no_memory(err) : MHE_OK;
+    if (!has_room || l->table.path == NULL) {
+        return no_memory(err);
+    }
+    return n_own == 0 && n_others > 0 ? no_subject(s, about, err) : MHE_OK;
 }
 
 /* Labels of the model that the stream lacks, and of the stream that the model has not. */

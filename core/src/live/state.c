@@ -116,6 +116,7 @@ mhe_status mhe_live_summary(mhe_live *l, char **json, mhe_error *err) {
     cJSON_AddNumberToObject(root, "frames", (double)l->feed.n_frames);
     cJSON_AddNumberToObject(root, "estimates", (double)l->feed.n_estimates);
     cJSON_AddNumberToObject(root, "passed_over", (double)l->feed.n_passed_over);
+    cJSON_AddNumberToObject(root, "clocks_set", (double)l->feed.n_clock_set);
     cJSON_AddNumberToObject(root, "out_of_order", (double)l->feed.n_out_of_order);
     cJSON *by = cJSON_AddObjectToObject(root, "by_status");
     for (int32_t i = 0; i < 5; i++) {

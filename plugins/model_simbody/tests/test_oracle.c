@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Against the reference data: two independent implementations of the arm and shoulder models. */
+#include "json.h"
 #include "test_models.h"
 
 #include "io/model_file.h"
@@ -14,26 +15,6 @@
 #define LIMIT 1e-8 /* of an array's largest difference to its largest entry, state by state */
 
 static double worst_error, worst_acceleration;
-
-static cJSON *read_json(const char *file) {
-    char path[1024], *text = NULL;
-    if (test_data_path(path, sizeof path, file) == NULL) {
-        skip();
-    }
-    FILE *in = fopen(path, "rb");
-    assert_non_null(in);
-    assert_int_equal(fseek(in, 0, SEEK_END), 0);
-    long size = ftell(in);
-    rewind(in);
-    text = malloc((size_t)size + 1);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, (size_t)size, in), size);
-    (void)fclose(in);
-    cJSON *json = cJSON_ParseWithLength(text, (size_t)size);
-    free(text);
-    assert_non_null(json);
-    return json;
-}
 
 /* Appends all numbers of nested arrays. */
 static int32_t flatten(const cJSON *node, double *out, int32_t n) {
@@ -121,7 +102,11 @@ static void compare_state(const test_instance *t, const cJSON *state) {
 static void compare_model(const char *model, const char *oracle, int32_t rotations) {
     mhe_description *description = NULL;
     mhe_error err = {0};
-    cJSON *json = read_json(oracle);
+    char path[1024];
+    if (test_data_path(path, sizeof path, oracle) == NULL) {
+        skip();
+    }
+    cJSON *json = test_json(path);
     if (mhi_model_read(model, &description, &err) != MHE_OK) {
         fail_msg("%s", err.text);
     }

@@ -2,6 +2,7 @@
 /* dynamics: simbody against the recursion on 25 public models, with every kind of joint, couplers,
  * massless bodies, inertias that break the triangle inequality, and the loops that two of them
  * have. */
+#include "json.h"
 #include "test_models.h"
 
 #include "io/model_file.h"
@@ -91,22 +92,6 @@ static double member(const cJSON *object, const char *name) {
     return item == NULL ? 0 : item->valuedouble;
 }
 
-static cJSON *read_json(const char *path) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    assert_int_equal(fseek(file, 0, SEEK_END), 0);
-    const long size = ftell(file);
-    rewind(file);
-    char *text = malloc((size_t)size + 1);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, (size_t)size, file), size);
-    (void)fclose(file);
-    cJSON *json = cJSON_ParseWithLength(text, (size_t)size);
-    free(text);
-    assert_non_null(json);
-    return json;
-}
-
 /* At the oracle's poses, at which loops are closed and its speeds keep them so; accelerations are
  * any: the rates of loops are compared all the same, in the same axes. */
 static void compare_model(const char *osim, const char *oracle) {
@@ -122,7 +107,7 @@ static void compare_model(const char *osim, const char *oracle) {
     values a = take(d), b = take(d);
     double *q = numbers(3 * (size_t)d->n_coordinates), *v = q + d->n_coordinates;
     double *vdot = v + d->n_coordinates;
-    cJSON *root = read_json(oracle);
+    cJSON *root = test_json(oracle);
     for (int k = 0; k < STATES; k++) {
         const cJSON *pose =
             cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "poses"), 2 * k);

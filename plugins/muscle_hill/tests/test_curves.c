@@ -66,6 +66,35 @@ static void force_derivatives(void **state) {
     assert_true(worst < 1e-6);
 }
 
+/* What the headers of the curves and docs/outputs.md say of negative forces: up to the largest
+ * shortening speed no set pushes by itself; the damping of `paper2021` does, by as much as it is.
+ */
+static void pushes_only_by_its_damping(void **state) {
+    (void)state;
+    const double l_opt = 0.1, f_max = 1000, rate = 0.1 * f_max / (10 * l_opt);
+    int pushing = 0;
+    for (size_t set = 0; set < sizeof sets / sizeof sets[0]; set++) {
+        const int paper = strstr(sets[set], "paper2021") != NULL;
+        for (int32_t type = 0; type < N_TYPES; type++) {
+            const mhe_muscle m = test_muscle(types[type], f_max, l_opt, 0.2, 0);
+            struct test_hill hill = test_hill(&m, 1, sets[set]);
+            assert_non_null(hill.ops);
+            for (int i = 0; i < 5 * 14 * 40; i++) {
+                const double a = i % 5 / 4.0, n = 0.3 + 0.1 * (i / 5 % 14);
+                const double w = 10 * l_opt * (i / 70 - 19.9) / 20;
+                const double f = force_at(&hill, a, 0.2 + l_opt * n, w);
+                if (!(f - (paper ? rate * w : 0) >= -1e-9 * f_max)) {
+                    fail_msg("%s, type %d: %g N at a %g, n %g, %g m/s", sets[set], (int)type, f, a,
+                             n, w);
+                }
+                pushing += f < 0;
+            }
+            hill.ops->destroy(hill.self);
+        }
+    }
+    assert_true(pushing > 0); /* an idle muscle of paper2021 */
+}
+
 static int rate_of(void *data, const double *x, double *y) {
     const struct test_hill *hill = data;
     return hill->ops->diagonal_rate(hill->self, 0, x, x + 1, y, NULL, NULL, NULL);
@@ -260,6 +289,7 @@ static void refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(force_derivatives),
+                                       cmocka_unit_test(pushes_only_by_its_damping),
                                        cmocka_unit_test(activation_derivatives),
                                        cmocka_unit_test(activation_landmarks),
                                        cmocka_unit_test(landmarks),

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Curves, fibres and forces of OpenSim's muscles as its files state them, against OpenSim 4.5.1:
  * rigid tendons of Millard2012EquilibriumMuscle, static equilibrium of Thelen2003Muscle. */
+#include "json.h"
 #include "test_muscle.h"
 
 #include "io/model_file.h"
@@ -9,23 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static cJSON *read_json(const char *path) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    assert_int_equal(fseek(file, 0, SEEK_END), 0);
-    long length = ftell(file);
-    assert_true(length > 0);
-    rewind(file);
-    char *text = calloc((size_t)length + 1, 1);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, (size_t)length, file), (size_t)length);
-    (void)fclose(file);
-    cJSON *json = cJSON_Parse(text);
-    free(text);
-    assert_non_null(json);
-    return json;
-}
 
 /* What the plugin says of all muscles at one pose. */
 struct pose {
@@ -53,7 +37,7 @@ static void model_open(struct model *m, const char *name, const char *yaml) {
     }
     (void)snprintf(file, sizeof file, "opensim/%s.oracle.json", name);
     assert_non_null(test_data_path(path, sizeof path, file));
-    m->json = read_json(path);
+    m->json = test_json(path);
     int32_t n = m->description->n_muscles;
     m->hill = test_hill(m->description->muscles, n, yaml);
     if (m->hill.ops == NULL) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Forces and activation rates against the oracle files, at their lengths and velocities. */
+#include "json.h"
 #include "test_muscle.h"
 
 #include "io/model_file.h"
@@ -8,23 +9,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static cJSON *read_json(const char *path) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    assert_int_equal(fseek(file, 0, SEEK_END), 0);
-    long length = ftell(file);
-    assert_true(length > 0);
-    rewind(file);
-    char *text = calloc((size_t)length + 1, 1);
-    assert_non_null(text);
-    assert_int_equal(fread(text, 1, (size_t)length, file), (size_t)length);
-    (void)fclose(file);
-    cJSON *json = cJSON_Parse(text);
-    free(text);
-    assert_non_null(json);
-    return json;
-}
 
 static void numbers(const cJSON *state, const char *key, int32_t n, double *out) {
     const cJSON *array = cJSON_GetObjectItemCaseSensitive(state, key);
@@ -61,7 +45,7 @@ static void compare(const char *model, const char *oracle, const char *yaml) {
     if (hill.ops == NULL) {
         fail_msg("%s", hill.err.text);
     }
-    cJSON *json = read_json(oracle_path);
+    cJSON *json = test_json(oracle_path);
     const cJSON *state = NULL, *states = cJSON_GetObjectItemCaseSensitive(json, "states");
     assert_true(cJSON_GetArraySize(states) > 10);
     double force_error = 0, rate_error = 0;

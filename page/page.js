@@ -100,16 +100,5 @@ function draw(now) {
 }
 for (const id of ["what", "low", "high"]) $(id).oninput = () => { dirty = true; lined = 0; };
 
-/* ---- a folder of results ---- */
-function open(r) {
-  document.body.classList.add("recorded");
-  begin(r); up = r.up;
-  $("findings").textContent = r.summary;
-  const bytes = Uint8Array.from(atob(r.values), c => c.charCodeAt(0)), all = new Float32Array(bytes.buffer), n = r.signals.reduce((k, s) => k + s.labels.length, 0);
-  history = r.time.map((t, k) => [k, t, r.status[k], 0, 0, 0, 0, 0, ...all.subarray(k * n, (k + 1) * n)]);
-  $("when").max = history.length - 1;
-  const show = () => { frame = history[+$("when").value]; $("moment").textContent = frame[1].toFixed(2) + " s"; dirty = true; lined = 0; };
-  $("when").oninput = show; show();
-}
 if (recorded) open(recorded); else connect();
 requestAnimationFrame(draw);

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// results.js: a folder of results: moments of the run as frames, which the figure and the numbers show as they show live ones, and
+// small pictures of all quantities.
+"use strict";
+function numbers(base64) {
+  const bytes = Uint8Array.from(atob(base64), c => c.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+const section = (name, ...content) => { const s = document.createElement("section"); s.className = "past " + name; s.append(...content); return s; };
+function heading(text) { const h = document.createElement("h2"); h.textContent = text; return h; }
+
+// A picture: its name, what it spans, and lines; drawn when it comes into sight.
+const seenOnce = new IntersectionObserver(list => list.forEach(e => { if (e.isIntersecting) { seenOnce.unobserve(e.target); e.target.show(); } }), { rootMargin: "300px" });
+function picture(p, group, times, pick) {
+  const box = document.createElement("div"), figure = document.createElement("figure"), caption = document.createElement("figcaption"), small = document.createElement("small");
+  small.textContent = ` ${+p.range[0].toPrecision(3)} to ${+p.range[1].toPrecision(3)} ${group.unit}`;
+  caption.append(p.name, small); box.className = "plot low"; figure.append(caption, box);
+  box.setAttribute("role", "img"); box.setAttribute("aria-label", `${group.heading}: ${p.name},${small.textContent}`);
+  box.show = () => {
+    const looks = { true: { name: "true", colour: css("--soft"), width: 3 }, measured: { name: "measured", colour: css("--amber") }, estimated: { name: "estimated", colour: css("--blue") } };
+    const lines = [], o = { least: group.least, legend: false, pick };
+    const deviation = p.lines.find(l => l[0] === "sd"), estimate = p.lines.find(l => l[0] === "estimated");
+    if (deviation) { // between the two lines that nobody sees
+      const sd = numbers(deviation[2]), x = times[estimate[1]], y = numbers(estimate[2]);
+      for (const sign of [1, -1]) lines.push({ name: "", colour: "transparent", width: 0, x, y: y.map((v, i) => v + sign * 1.96 * sd[i]) });
+      o.sd = [1, 2];
+    }
+    for (const [kind, time, values] of p.lines) if (looks[kind]) lines.push({ ...looks[kind], x: times[time], y: numbers(values) });
+    drawStill(box, lines, o);
+  };
+  seenOnce.observe(box);
+  return figure;
+}
+
+function open(r) {
+  document.body.classList.add("recorded");
+  begin(r); up = r.up;
+  const verdict = /^usable: (yes|doubtful|no)\n/.exec(r.summary); // not to be overlooked
+  if (verdict) { $("verdict").textContent = verdict[0].trim(); $("verdict").className = "verdict " + verdict[1]; }
+  $("verdict").hidden = !verdict;
+  $("findings").textContent = verdict ? r.summary.slice(verdict[0].length) : r.summary;
+  $("h-figure").closest("section").hidden = !labels("skeleton").length && !labels("markers").length;
+  const all = numbers(r.values), n = r.signals.reduce((k, s) => k + s.labels.length, 0);
+  history = r.time.map((t, k) => [k, t, r.status[k], 0, 0, 0, 0, 0, ...all.subarray(k * n, (k + 1) * n)]);
+  $("when").max = history.length - 1;
+  const show = () => { frame = history[+$("when").value]; $("moment").textContent = frame[1].toFixed(2) + " s"; dirty = true; lined = 0; };
+  const pick = t => { let best = 0; r.time.forEach((v, i) => { if (Math.abs(v - t) < Math.abs(r.time[best] - t)) best = i; }); $("when").value = best; show(); };
+  $("when").oninput = show; show();
+  const kinds = new Set(r.groups.flatMap(g => g.panels.flatMap(p => p.lines.map(l => l[0]))));
+  $("key").textContent = "Blue: estimated" + (kinds.has("sd") ? ", with its nominal 95 % band" : "") + "." + (kinds.has("measured") ? " Orange: measured." : "") +
+    (kinds.has("true") ? " Grey: the known truth." : "") + " Least and largest value stand above each picture; a click in one chooses the moment.";
+  const times = r.times.map(numbers);
+  for (const g of r.groups) {
+    if (!g.panels.length) continue;
+    const grid = document.createElement("div");
+    grid.className = "pictures"; grid.append(...g.panels.map(p => picture(p, g, times, pick)));
+    document.querySelector("main").append(section("wide", heading(g.heading), grid));
+  }
+}

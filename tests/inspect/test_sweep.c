@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Sweeps of every coordinate of public models in 400 steps: lengths jump where a conditional point
+ * goes on or off, and where docs/paths.md says so. */
+#include "json.h"
+#include "support.h"
+
+#include <mhe/inspect.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define STEPS 400
+
+/* Paths that jump as OpenSim's rules have it. */
+static const struct {
+    const char *model, *path;
+    int jumps;
+} known[] = {{"MOBL_ARMS_41", "TMIN", 2},
+             {"MOBL_ARMS_41", "TRIlong", 1},
+             {"MOBL_ARMS_41", "CORB", 1},
+             {"ThoracoscapularShoulderModel", "TeresMajor", 3}};
+#define N_KNOWN (sizeof known / sizeof known[0])
+
+static const char *const models[] = {"arm26",
+                                     "gait10dof18musc",
+                                     "subject01_metabolics_path_spring",
+                                     "gait2354_simbody",
+                                     "gait2392_thelen2003muscle",
+                                     "gait2392_millard2012muscle",
+                                     "FullBodyModel_Hamner2010_v2_0",
+                                     "leg39",
+                                     "Rajagopal2016",
+                                     "RajagopalLaiUhlrich2023",
+                                     "wrist",
+                                     "Tug_of_War_Millard",
+                                     "MOBL_ARMS_41",
+                                     "Wu_Shoulder_Model_via_points",
+                                     "ThoracoscapularShoulderModel",
+                                     "HYOID",
+                                     "testMomentArmsConstraintA",
+                                     "testMomentArmsConstraintB",
+                                     "PathOnConstrainedBodyMomentArmTest",
+                                     "MovingPathPointMomentArmTest",
+                                     "MultipleMPPsMomentArmTest",
+                                     "CoupledCoordinatesMPPsMomentArmTest",
+                                     "WrapPathCustomJointMomentArmTest",
+                                     "P2PBallJointMomentArmTest",
+                                     "toyLigamentModel"};
+
+static void sweep_model(const char *name, int *conditional, int *others) {
+    char file[256], path[1024], *text = NULL;
+    mhe_error err = {0};
+    int of[N_KNOWN] = {0};
+    (void)snprintf(file, sizeof file, "opensim/%s.osim", name);
+    if (test_data_path(path, sizeof path, file) == NULL) {
+        skip();
+    }
+    if (mhe_model_sweep(NULL, path, STEPS, MHE_FORMAT_JSON, &text, &err) != MHE_OK) {
+        fail_msg("%s", err.text);
+    }
+    cJSON *answer = cJSON_Parse(text);
+    assert_non_null(answer);
+    const cJSON *jump;
+    cJSON_ArrayForEach(jump, cJSON_GetObjectItem(answer, "jumps")) {
+        const char *whose = cJSON_GetObjectItem(jump, "path")->valuestring;
+        assert_true(fabs(cJSON_GetObjectItem(jump, "size")->valuedouble) >= 1e-3);
+        if (cJSON_IsTrue(cJSON_GetObjectItem(jump, "conditional"))) {
+            *conditional += 1;
+            continue;
+        }
+        size_t k = 0;
+        while (k < N_KNOWN &&
+               (strcmp(known[k].model, name) != 0 || strcmp(known[k].path, whose) != 0)) {
+            k++;
+        }
+        if (k == N_KNOWN || ++of[k] > known[k].jumps) {
+            fail_msg("%s: %s jumps by %.2f mm at %s = %.4f", name, whose,
+                     1e3 * cJSON_GetObjectItem(jump, "size")->valuedouble,
+                     cJSON_GetObjectItem(jump, "coordinate")->valuestring,
+                     cJSON_GetObjectItem(jump, "at")->valuedouble);
+        }
+        *others += 1;
+    }
+    cJSON_Delete(answer);
+    mhe_free(text);
+}
+
+static void lengths_jump_only_where_it_is_known(void **state) {
+    (void)state;
+    int conditional = 0, others = 0;
+    for (size_t i = 0; i < sizeof models / sizeof models[0]; i++) {
+        sweep_model(models[i], &conditional, &others);
+    }
+    print_message("25 models: %d jumps at conditional points, %d others\n", conditional, others);
+    assert_true(conditional > 0);
+}
+
+int main(void) {
+    const struct CMUnitTest tests[] = {cmocka_unit_test(lengths_jump_only_where_it_is_known)};
+    return cmocka_run_group_tests(tests, NULL, NULL);
+}
