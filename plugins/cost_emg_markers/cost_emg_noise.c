@@ -20,7 +20,7 @@ static const mhe_option emg_noise_options[] = {
     MHE_OPT_REAL(struct emg_noise_config, markers, 0.001, 1e-6, 1, "m",
                  "Least standard deviation of a marker's coordinate."),
     MHE_OPT_REAL(
-        struct emg_noise_config, markers_misfit, 1, 0, 10, "1",
+        struct emg_noise_config, markers_misfit, 0.5, 0, 10, "1",
         "The same as a share of how far all markers were from the estimates so far (RMS of "
         "a coordinate); the larger counts."),
     MHE_OPT_REAL(

@@ -263,9 +263,10 @@ static void tell_left(const simbody_context *c) {
     if (c->host != NULL && c->route_work.left > 0) {
         char text[160];
         (void)snprintf(text, sizeof text,
-                       "%lld lengths of fitted paths were outside their range, and exact there",
+                       "%lld lengths of fitted paths were outside their range, and exact there "
+                       "(model.motion and paths_range say what they are fitted over)",
                        (long long)c->route_work.left);
-        c->host->log(c->host, MHE_LOG_INFO, text);
+        c->host->log(c->host, MHE_LOG_WARNING, text);
     }
 }
 

@@ -9,6 +9,7 @@
 #include <string.h>
 
 #define TOLD_JUMP 2e-3 /* m: a larger one is a warning */
+#define MOST_NAMED 6
 
 int fit_allocate(path_fit *fit, int32_t n, int32_t n_terms) {
     size_t a = (size_t)n + 1, b = (size_t)n_terms + 1;
@@ -23,6 +24,29 @@ int fit_allocate(path_fit *fit, int32_t n, int32_t n_terms) {
                    fit->coef != NULL && fit->exponent != NULL
                ? 0
                : -1;
+}
+
+/* One line: how many of the paths are polynomials, and which miss the tolerance. */
+static void tell_exact(const mhe_host *host, const mhe_description *d, const path_fits *fits,
+                       int32_t n_fitted) {
+    char text[320];
+    int32_t n = 0;
+    int at =
+        snprintf(text, sizeof text, "%d of %d paths are polynomials", (int)n_fitted, (int)fits->n);
+    for (int32_t i = 0; i < fits->n; i++) {
+        if (fits->fits[i].fitted || fits->fits[i].why[0] == '\0') {
+            continue;
+        }
+        n++;
+        if (n > MOST_NAMED || at >= (int)sizeof text - 64) {
+            (void)snprintf(text + at, sizeof text - (size_t)at, ", ...");
+            break;
+        }
+        at += snprintf(text + at, sizeof text - (size_t)at, "%s%.40s",
+                       n == 1 ? "; what misses paths_tolerance over the range stays exact: " : ", ",
+                       d->paths[i].name);
+    }
+    host->log(host, n > 0 ? MHE_LOG_WARNING : MHE_LOG_INFO, text);
 }
 
 static void tell(const mhe_host *host, const mhe_description *d, const path_fits *fits) {
@@ -52,8 +76,7 @@ static void tell(const mhe_host *host, const mhe_description *d, const path_fits
         }
     }
     if (host != NULL) {
-        (void)snprintf(text, sizeof text, "%d of %d paths are polynomials", (int)n, (int)fits->n);
-        host->log(host, MHE_LOG_INFO, text);
+        tell_exact(host, d, fits, n);
     }
 }
 

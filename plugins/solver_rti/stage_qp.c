@@ -143,27 +143,47 @@ void qp_backward_p(const qp_shape *s, const qp_stage *stage, const double *p, do
     }
 }
 
+/* How many of the list from place i on stand one behind the other. */
+static int32_t run_of(const qp_stage *stage, int32_t i) {
+    int32_t n = 1;
+    while (i + n < stage->n_costly && stage->costly[i + n] == stage->costly[i] + n) {
+        n++;
+    }
+    return n;
+}
+
 void qp_add_costs_p(const qp_shape *s, const qp_stage *stage, const double *w, const double *p,
                     double of_p, double *out) {
-    for (int32_t i = 0; i < stage->n_costly; i++) {
+    for (int32_t i = 0, n = 0; i < stage->n_costly; i += n) {
         const int32_t at = stage->costly[i];
-        const double *C = stage->C + (ptrdiff_t)at * s->ld_z, *D = stage->D + at * s->n_p;
-        double by_w = 0, by_p = 0;
-        for (int32_t j = 0; j < s->n_z; j++) {
-            by_w += C[j] * w[j];
-        }
+        n = run_of(stage, i);
+        s->kernels->add(n, s->n_z, 1, stage->C + (ptrdiff_t)at * s->ld_z, s->ld_z, w, out + at);
+    }
+    for (int32_t i = 0; i < stage->n_costly && of_p != 0; i++) {
+        const int32_t at = stage->costly[i];
+        const double *D = stage->D + at * s->n_p;
+        double by_p = 0;
         for (int32_t j = 0; j < stage->n_costly; j++) {
             by_p += D[stage->costly[j]] * p[stage->costly[j]];
         }
-        out[at] += by_w + of_p * by_p;
+        out[at] += of_p * by_p;
     }
+}
+
+static int32_t is_zero(const double *values, int32_t n) {
+    int32_t zero = 1;
+    for (int32_t i = 0; i < n && zero; i++) {
+        zero = values[i] == 0;
+    }
+    return zero;
 }
 
 void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out) {
     const double *p = w + (ptrdiff_t)(s->N + 1) * s->ld_z;
+    const double of_p = is_zero(p, s->n_p) ? 0 : 1;
     for (int32_t k = 0; k <= s->N && s->n_p > 0; k++) {
-        qp_add_costs_p(s, &stages[k], w + (ptrdiff_t)k * s->ld_z, p, 1, out);
+        qp_add_costs_p(s, &stages[k], w + (ptrdiff_t)k * s->ld_z, p, of_p, out);
         if (k < s->N) {
             s->kernels->add(s->n_p, stages[k].n_reached, -1, stages[k].Pt, s->ld_x,
                             lambda + (ptrdiff_t)k * s->ld_x, out);

@@ -64,7 +64,7 @@ cmp -s made/recording.c3d other/recording.c3d && fail "another seed, the same re
 [ "$(cmp -l lab_made/recording.c3d "$arm/lab_recording.c3d" | wc -l)" -lt 100 ] || fail "lab: it is another recording"
 "$bin/mhe-run" "$arm/lab.yaml" --out lab --set output.picture=false > lab.txt 2>&1 || fail "lab: $(cat lab.txt)"
 grep -qx 'usable: yes' lab.txt || fail "lab: $(cat lab.txt)"
-within lab q_deg 0.39 0.478
-within lab force_n 11.8 14.4
+within lab q_deg 0.357 0.437
+within lab force_n 12.1 14.7
 
 finish "raw EMG"

@@ -30,9 +30,9 @@ def make(folder, page, source, build):
             (folder / name).symlink_to(source / name)
     (folder / "build").mkdir()
     (folder / "build/release").symlink_to(build)
-    for name, file in (WALK if page == "walking.md" else ARM).items():
+    for name, file in (WALK if page == "docs/walking.md" else ARM).items():
         (folder / name).symlink_to(source / file)
-    if page == "walking.md":
+    if page == "docs/walking.md":
         (folder / "ik_tasks.xml").write_text(TASKS)
         emg = (source / "models/gait10dof/demo_walk_emg.sto").read_text()
         (folder / "emg.sto").write_text(emg.replace("\tsoleus_r", "\tsoleus").replace("\thamstrings_r", "\thamstrings"))

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Does what README.md and docs/*.md tell a reader to do: every block of theirs is run, checked or compiled.
+"""Does what the pages tell a reader to do (README.md, CONTRIBUTING.md, docs/, the READMEs of plugins and models): every block
+of theirs is run, checked or compiled.
 
     snippets.py SOURCE_DIR PROGRAMS [PAGE]...
 
@@ -13,6 +14,7 @@ is commands where its first word is one, else YAML. Commands are run; YAML passe
     <!-- save: NAME -->       the block is that file; later blocks use it
     <!-- do: COMMAND -->      of a saved block, instead of mhe-run --check
     <!-- like: CONFIG -->     YAML that is a part of a config: its keys are set in CONFIG, which is then checked
+    <!-- each: CONFIG -->     the same of each line: one or the other
 
 A block that is none of these fails. What needs a program that is missing here is counted as skipped.
 """
@@ -36,6 +38,9 @@ except ImportError:
     sys.exit(77)
 
 source, programs = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+# YAML 1.1 as the library reads it, and not as PyYAML does: 1e-3 is a number.
+yaml.SafeLoader.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"),
+                                      list("-+.0123456789"))
 build = programs.parent
 failures, counts, helps = [], collections.Counter(), {}
 COMMANDS = re.compile(r"([A-Z_]+=\S+ )*(\./bootstrap|\S*/?mhe-[a-z]+|cp|cmake|ctest|octave|mex|export|docs/|tests/|for|apt|perf|podman)\b")
@@ -133,6 +138,10 @@ def run_commands(block, folder):
 
 
 def check_yaml(block, folder):
+    if "each" in block.remarks:
+        for line in block.text.splitlines():
+            check_yaml(Block(block.page, block.line, "yaml", line, {"like": block.remarks["each"]}), folder)
+        return
     try:
         config = yaml.safe_load(block.text)
     except yaml.YAMLError as error:
@@ -184,10 +193,11 @@ def do(block, folder):
 def main():
     work = Path(tempfile.mkdtemp())
     os.environ["XDG_CACHE_HOME"] = str(work / "cache")
-    pages = sys.argv[3:] or ["README.md", *sorted(f"docs/{page.name}" for page in (source / "docs").glob("*.md"))]
+    pages = sys.argv[3:] or [str(page.relative_to(source)) for pattern in ("README.md", "CONTRIBUTING.md", "docs/*.md", "*s/*/README.md")
+                             for page in sorted(source.glob(pattern)) if page.parts[-3] in ("plugins", "models") or "*s" not in pattern]
     try:
         for page in pages:
-            folder = scene.make(work / Path(page).stem, Path(page).name, source, build)
+            folder = scene.make(work / page.replace("/", "_"), page, source, build)
             for block in blocks_of(page, (source / page).read_text()):
                 do(block, folder)
     finally:

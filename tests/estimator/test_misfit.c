@@ -78,12 +78,12 @@ static outcome run(const char *cost, double off) {
 static void markers_that_do_not_fit_are_believed_less(void **state) {
     (void)state;
     const outcome firm = run("{plugin: mhe.cost.emg-markers, markers_misfit: 0}", 0.015);
-    const outcome learnt = run("mhe.cost.emg-markers", 0.015);
+    const outcome learnt = run("{plugin: mhe.cost.emg-markers, markers_misfit: 1}", 0.015);
     print_message("force %.2f N and %.2f N, angles %.4f and %.4f rad\n", firm.force, learnt.force,
                   firm.angle, learnt.angle);
     assert_true(learnt.force < 0.9 * firm.force);
     assert_true(learnt.angle < firm.angle);
-    const outcome fits = run("mhe.cost.emg-markers", 0);
+    const outcome fits = run("{plugin: mhe.cost.emg-markers, markers_misfit: 1}", 0);
     const outcome fits_firm = run("{plugin: mhe.cost.emg-markers, markers_misfit: 0}", 0);
     assert_memory_equal(fits.last_force, fits_firm.last_force, sizeof fits.last_force);
 }

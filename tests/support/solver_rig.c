@@ -35,6 +35,16 @@ void rig_close(rig *r) {
     free(r->memory);
 }
 
+void rig_open_pendulum(rig *r, toy *t, int n_intervals, const char *yaml) {
+    toy_pendulum(t, n_intervals);
+    assert_int_equal(rig_open(r, t, yaml), MHE_OK);
+}
+
+void rig_close_both(rig *r, toy *t) {
+    rig_close(r);
+    toy_free(t);
+}
+
 void rig_reset(rig *r) {
     const mhe_stage_problem *p = &r->t->problem;
     int n_xs = (p->n_intervals + 1) * p->n_x, n_us = p->n_intervals * p->n_u;

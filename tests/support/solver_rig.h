@@ -19,6 +19,9 @@ typedef struct rig {
  * 1e-8}") on t; gives the status of create(). */
 mhe_status rig_open(rig *r, toy *t, const char *yaml);
 void rig_close(rig *r);
+/* A pendulum and a solver on it, which must be created. */
+void rig_open_pendulum(rig *r, toy *t, int n_intervals, const char *yaml);
+void rig_close_both(rig *r, toy *t);
 
 /* Zero iterate without multipliers. */
 void rig_reset(rig *r);

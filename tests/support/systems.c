@@ -285,3 +285,47 @@ double test_step_derivatives(const struct test_integrator *integrator, const dou
     free(memory);
     return error;
 }
+
+/* ---- a system that answers badly ---- */
+
+static mhe_system inner;
+
+static mhe_status domain_acceleration(const mhe_system *system, void *context,
+                                      const mhe_system_point *at, const mhe_acceleration *out,
+                                      mhe_error *err) {
+    (void)system;
+    if (at->q[0] > 100) {
+        return mhe_fail(err, MHE_E_NUMERIC, "stop");
+    }
+    if (at->q[0] > 10) {
+        return mhe_fail(err, MHE_RETRY, "outside");
+    }
+    return inner.acceleration(&inner, context, at, out, err);
+}
+
+void test_integrator_meets_bad_points(const char *plugin) {
+    test_pendulum_system(SYSTEM_EXCITATION, &inner);
+    mhe_system system = inner;
+    system.acceleration = domain_acceleration;
+    struct test_integrator flow = test_integrator_open(plugin, "", &system, NULL);
+    double x[SYSTEM_X] = {11, 0, 0, 0, 0.5, 0.5, 0.5}, u[SYSTEM_M] = {0, 0, 0}, next[SYSTEM_X];
+    mhe_error err = {0};
+    assert_int_equal(flow.ops->step(flow.context, x, u, NULL, 0.03, NULL, next, NULL, &err),
+                     MHE_RETRY);
+    assert_string_equal(err.text, "outside");
+    x[0] = 101;
+    assert_int_equal(flow.ops->step(flow.context, x, u, NULL, 0.03, NULL, next, NULL, &err),
+                     MHE_E_NUMERIC);
+    const double bad[] = {NAN, INFINITY};
+    for (int i = 0; i < SYSTEM_X; i++) {
+        for (int k = 0; k < 2; k++) {
+            double y[SYSTEM_X] = {0, 0, 0, 0, 0.5, 0.5, 0.5};
+            y[i] = bad[k];
+            assert_true(flow.ops->step(flow.context, y, u, NULL, 0.03, NULL, next, NULL, &err) !=
+                        MHE_OK);
+        }
+    }
+    x[0] = 0; /* and it goes on */
+    test_integrate(&flow, x, u, 0.03, next, NULL, NULL);
+    test_integrator_close(&flow);
+}

@@ -34,6 +34,9 @@ struct test_integrator {
 struct test_integrator test_integrator_open(const char *id, const char *yaml,
                                             const mhe_system *system, void *system_context);
 void test_integrator_close(struct test_integrator *integrator);
+/* Points where the system asks to retry or gives up, and such as are no numbers, are answered by
+ * the status; the next good one is integrated. */
+void test_integrator_meets_bad_points(const char *plugin);
 
 /* x+ = F(x, u); fails the test unless the step is done. */
 void test_integrate(const struct test_integrator *integrator, const double *x, const double *u,

@@ -43,7 +43,7 @@ typedef struct mhi_calibration {
     mhi_motion *motions;    /* [plan.n_recordings] */
     mhi_estimated *list;    /* [n] */
     int32_t n;
-    int32_t insertions, masses;     /* 1: are among them */
+    int32_t asked[MHI_OF_KINDS];    /* 1: are among them */
     int32_t *list_of[MHI_OF_KINDS]; /* numbers of muscles, markers, bodies; -1: none. Of offsets
                                      * the first of three, insertions' [n_m x 3] */
     double *covariance;             /* [n x n] of the list */
@@ -65,6 +65,10 @@ mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_ho
 void mhi_calibration_close(mhi_calibration *calibration);
 /* Finds the parameters and how well they are known. [cold] */
 mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);
+
+/* search.c: from a start s to the solution, c->info says how it ended. */
+mhe_status mhi_calibration_search(mhi_calibration *c, mhi_ocp *ocp, const mhe_solver_ops *solver,
+                                  void *self, mhe_solution *s, mhe_error *err);
 
 /* choose.c: the plan's entries as numbers, and which number of the model each belongs to. */
 mhe_status mhi_calibration_choose(mhi_calibration *c, mhe_error *err);

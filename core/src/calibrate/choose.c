@@ -166,15 +166,17 @@ static mhe_status expect_masses(mhi_calibration *c, mhe_error *err) {
     return MHE_OK;
 }
 
-/* Room for all lists, -1. */
+/* Room for all lists, -1: those of the system's numbers one behind the other, as the system has
+ * them; what is not asked for behind all others. */
 static mhe_status make_lists(mhi_calibration *c, mhe_error *err) {
+    static const int32_t of_system[] = {MHI_OF_STRENGTH, MHI_OF_OPTIMAL, MHI_OF_SLACK,
+                                        MHI_OF_INSERTION, MHI_OF_MASS};
+    static const int32_t others[] = {MHI_OF_GAIN, MHI_OF_SHAPE, MHI_OF_DELAY, MHI_OF_MARKER};
     const int32_t n_m = c->model->n_muscles, n_k = c->model->n_markers, n_b = c->model->n_bodies;
     const int32_t n = 9 * n_m + n_k + n_b;
     int32_t *numbers = MHI_TAKE(&c->arena, int32_t, n), most = 0;
     for (int32_t i = 0; i < c->plan.n_entries; i++) {
-        const int32_t kind = c->plan.entries[i].kind;
-        c->insertions |= kind == MHI_OF_INSERTION;
-        c->masses |= kind == MHI_OF_MASS;
+        c->asked[c->plan.entries[i].kind] = 1;
         most += 3 * n_subjects(c, &c->plan.entries[i]);
     }
     c->list = MHI_TAKE(&c->arena, mhi_estimated, most);
@@ -184,19 +186,20 @@ static mhe_status make_lists(mhi_calibration *c, mhe_error *err) {
     for (int32_t i = 0; i < n; i++) {
         numbers[i] = -1;
     }
-    /* the system's one behind the other, as it has them */
     int32_t *next = numbers;
-    for (int32_t kind = MHI_OF_STRENGTH; kind <= MHI_OF_SLACK; kind++, next += n_m) {
-        c->list_of[kind] = next;
+    for (int32_t asked = 1; asked >= 0; asked--) {
+        for (size_t i = 0; i < sizeof of_system / sizeof of_system[0]; i++) {
+            const int32_t kind = of_system[i];
+            if (c->asked[kind] == asked) {
+                c->list_of[kind] = next;
+                next += kind == MHI_OF_INSERTION ? 3 * n_m : kind == MHI_OF_MASS ? n_b : n_m;
+            }
+        }
     }
-    c->list_of[MHI_OF_INSERTION] = c->insertions ? next : numbers + n - 3 * n_m;
-    next += c->insertions ? 3 * n_m : 0;
-    c->list_of[MHI_OF_MASS] = next;
-    next += n_b;
-    c->list_of[MHI_OF_GAIN] = next;
-    c->list_of[MHI_OF_SHAPE] = next + n_m;
-    c->list_of[MHI_OF_DELAY] = next + 2 * n_m;
-    c->list_of[MHI_OF_MARKER] = next + 3 * n_m;
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; i++) {
+        c->list_of[others[i]] = next;
+        next += others[i] == MHI_OF_MARKER ? n_k : n_m;
+    }
     c->setup = (mhi_parameters_setup){.of_system = numbers,
                                       .gain = c->list_of[MHI_OF_GAIN],
                                       .shape = c->list_of[MHI_OF_SHAPE],

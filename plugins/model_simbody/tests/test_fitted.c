@@ -122,6 +122,7 @@ static void a_motion_that_is_known_is_what_is_fitted(void **state) {
     test_instance wide, fitted;
     fitted_open(&wide, NULL);
     fitted_open(&fitted, motion[0]);
+    assert_non_null(strstr(test_told, "7 of 9 paths are polynomials; what misses paths_tolerance"));
     int few = fit_errors(&wide, centre, half, rms), off = fit_errors(&fitted, centre, wider, rms);
     print_message("%d of %d paths are fitted there, without the motion %d\n", off, N_P, few);
     assert_true(off > few);
