@@ -3,7 +3,7 @@
 // it comes over the socket (live), or all of them stand in the page (a folder of results).
 "use strict";
 const HEAD = 8, SECONDS = 10, token = new URLSearchParams(location.search).get("token") || "";
-let run = null, up = 1, place = {}, history = [], frame = null, socket = null, picked = [], received = 0, dirty = true, drawn = 0;
+let run = null, up = 1, place = {}, history = [], frame = null, socket = null, picked = [], received = 0, dirty = true;
 const latencies = [], recorded = JSON.parse($("recorded").textContent);
 window.onerror = what => { window.thrown = what; };
 window.mhe = { get received() { return received; }, get frame() { return frame; }, get run() { return run; }, get uplot() { return typeof uPlot !== "undefined"; } }; // for tests and the curious
@@ -68,7 +68,6 @@ function showMuscles() {
   });
 }
 function showNumbers() {
-  showMuscles();
   const v = value(frame, $("what").value || "force:0"), low = +$("low").value, high = +$("high").value;
   $("big").textContent = Number.isFinite(v) ? v.toFixed(Math.abs(v) < 10 ? 1 : 0) : "\u2013";
   $("big").className = v >= low && v <= high ? "in" : "out";
@@ -80,8 +79,8 @@ function showNumbers() {
   say("missing", (p && p.n ? gone + " of " + p.n / 3 + " markers missing" : "") + (lost ? ", " + lost + " frames not shown" : ""), gone || lost ? "bad" : "good");
 }
 
-/* ---- pictures: the figure with each new frame, lines some ten times a second ---- */
-const LINES_EVERY = 90; // ms
+/* ---- pictures: figure and number some twenty times a second, lines and tables four times: a page is one of many things on a machine ---- */
+const FIGURE_EVERY = 45, LINES_EVERY = 250; // ms
 let lined = 0;
 function drawLines() {
   const what = $("what").value || "force:0", muscles = labels("force"), chosen = $("what").selectedOptions[0];
@@ -92,11 +91,11 @@ function drawLines() {
     ...(place.emg && place.emg.n ? [{ name: "EMG " + muscles[i], key: "emg:" + i, colour: colours[i % colours.length], dash: [4, 4] }] : [])]), value);
 }
 function draw(now) {
-  if (dirty && frame && now - drawn > 30) {
-    dirty = false; drawn = now; figure(); showNumbers();
-    if (now - lined > LINES_EVERY) { lined = now; drawLines(); }
+  if (dirty && frame) {
+    dirty = false; figure(); showNumbers();
+    if (!lined || now - lined > LINES_EVERY) { lined = now; drawLines(); showMuscles(); }
   }
-  requestAnimationFrame(draw);
+  setTimeout(() => requestAnimationFrame(draw), FIGURE_EVERY);
 }
 for (const id of ["what", "low", "high"]) $(id).oninput = () => { dirty = true; lined = 0; };
 

@@ -4,7 +4,7 @@
 const $ = id => document.getElementById(id);
 const colours = ["#1f77b4", "#d62728", "#2ca02c", "#e07b00", "#7b4fb5", "#00838f", "#c2185b", "#6d7f1b"];
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const plots = new Map();
+const plots = new Map(), POINTS = 400; // of a line; more would not be seen
 
 // A canvas in the pixels of the screen.
 function sheet(c) {
@@ -91,7 +91,8 @@ function drawStill(box, lines, o) {
 
 // Draws `lines` [{name, key, colour, dash}] of the frames into the box `id`; `band` () => [low, high] or null.
 function drawPlot(id, frames, lines, value, band = () => null) {
-  const box = $(id), names = lines.map(l => l.name + l.key).join();
+  const box = $(id), names = lines.map(l => l.name + l.key).join(), step = Math.ceil(frames.length / POINTS);
+  frames = frames.filter(f => f[0] % step === 0); // by the frame's number: the same ones each time
   const data = [frames.map(f => f[1]), ...lines.map(l => frames.map(f => { const v = value(f, l.key); return Number.isFinite(v) ? v : null; }))];
   if (typeof uPlot === "undefined") { plainPlot(box, lines, data, band); return; }
   let p = plots.get(id);

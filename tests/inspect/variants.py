@@ -194,6 +194,8 @@ for name, (text, part) in WRONG.items():
         said = run('evaluate', 'm.osim', '--poses', 'poses.json')
     lines = said.stderr.strip().splitlines()
     expect(name, said.returncode == 2 and len(lines) == 1 and part in lines[0], said)
+said = info(model(muscle(wraps=around('E').replace('hybrid', 'fancy')), wraps=obstacle()))
+expect('method', said.returncode == 0 and any("M' is 'fancy'" in line for line in json.loads(said.stdout)['warnings']), said)
 info(INSIDE)
 write_poses(['hip', 'knee'])
 said = run('evaluate', 'm.osim', '--poses', 'poses.json')

@@ -286,6 +286,39 @@ double test_step_derivatives(const struct test_integrator *integrator, const dou
     return error;
 }
 
+void test_pendulum_state(uint64_t *seed, const mhe_system *system, double *x, double *u) {
+    for (int32_t i = 0; i < system->n_x; i++) {
+        x[i] = i < 4 ? test_random(seed, -1.2, 1.2) * (i < 2 ? 1 : 4) : test_random(seed, 0, 1);
+    }
+    for (int32_t i = 0; i < system->n_u; i++) {
+        u[i] = i < SYSTEM_M ? test_random(seed, 0, 1) : test_random(seed, -3, 3);
+    }
+}
+
+void test_derivatives_of_steps(const char *id, const char *const *configs, size_t n_configs,
+                               int n_trials, double shortest, double longest, double most) {
+    uint64_t seed = 5;
+    double worst = 0;
+    for (int32_t flags = 0; flags < SYSTEM_N_FLAGS; flags++) {
+        mhe_system system;
+        test_pendulum_system(flags, &system);
+        for (size_t k = 0; k < n_configs; k++) {
+            struct test_integrator one = test_integrator_open(id, configs[k], &system, NULL);
+            for (int trial = 0; trial < n_trials; trial++) {
+                double x[SYSTEM_X], u[SYSTEM_U];
+                test_pendulum_state(&seed, &system, x, u);
+                const double dt = test_random(&seed, shortest, longest);
+                const double error = test_step_derivatives(&one, x, u, dt);
+                assert_true(error >= 0);
+                worst = fmax(worst, error);
+            }
+            test_integrator_close(&one);
+        }
+    }
+    print_message("A, B against differences: %.1e\n", worst);
+    assert_true(worst < most);
+}
+
 /* ---- a system that answers badly ---- */
 
 static mhe_system inner;

@@ -18,6 +18,10 @@
 /* Two links under gravity with three muscle-like actuators: force-length, force-velocity and the
  * De Groote activation dynamics. Angles from the horizontal. */
 void test_pendulum_system(int32_t flags, mhe_system *out);
+#define SYSTEM_N_FLAGS 4 /* all combinations of the two flags */
+/* Angles, velocities, activations and controls anywhere they may be; u[0..SYSTEM_M) are muscles'.
+ */
+void test_pendulum_state(uint64_t *seed, const mhe_system *system, double *x, double *u);
 double test_pendulum_energy(const double *q, const double *v);
 
 /* vdot = -K q - D v + G a + r, adot = (e - a) / tau. */
@@ -48,5 +52,11 @@ double test_relative(const double *value, const double *expected, int32_t n);
 /* Error of A and B against central differences of the step (test_jacobian_error). */
 double test_step_derivatives(const struct test_integrator *integrator, const double *x,
                              const double *u, double dt);
+
+/* The same of an integrator with each of its configurations on the pendulum of all flags, from
+ * n_trials random states over steps of `shortest` to `longest` s; fails the test unless all are
+ * below `most`. */
+void test_derivatives_of_steps(const char *id, const char *const *configs, size_t n_configs,
+                               int n_trials, double shortest, double longest, double most);
 
 #endif

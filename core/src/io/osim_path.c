@@ -121,8 +121,18 @@ static void read_wrap(mhi_osim *o, xmlNode *node, mhi_path_draft *path) {
     }
     draft->obstacle = object;
     draft->line = mhi_xml_line(node);
+    int32_t known = method == NULL || mhi_same_word(method, "unassigned");
     for (int32_t i = 0; method != NULL && i < 3; i++) {
-        draft->wrap.method = mhi_same_word(method, methods[i]) ? i : draft->wrap.method;
+        if (mhi_same_word(method, methods[i])) {
+            draft->wrap.method = i;
+            known = 1;
+        }
+    }
+    if (!known) {
+        mhi_build_warn(&o->b, draft->line,
+                       "the method of a wrap of %s '%s' is '%s', not hybrid, midpoint or axial: it "
+                       "makes no difference here",
+                       path->what, path->name, method);
     }
     (void)mhi_xml_numbers(o, node, "range", range, 2); /* points counted from 1; -1: no end */
     draft->wrap.first = range[0] >= 1 && range[0] < INT32_MAX ? (int32_t)range[0] - 1 : -1;

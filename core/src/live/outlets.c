@@ -8,6 +8,7 @@
 
 #include <math.h>
 #include <pthread.h>
+#include <semaphore.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +16,8 @@
 
 #define RING 1024  /* estimates; a power of two: ten seconds that a file may stall */
 #define HEAD 6     /* numbers of a record before the values */
-#define IDLE 0.001 /* s without an estimate */
+#define IDLE 0.001 /* s that a sink with a poll of its own may take for it */
+#define LOOK 0.05  /* s that others wait for an estimate at once */
 #define LATENCIES 4096
 
 enum {
@@ -46,6 +48,7 @@ typedef struct outlet {
     const double *values[N_SIGNALS];
     mhi_figure_view view;
     double *bones, *paths;
+    sem_t filled; /* posted for every estimate, to a sink without a poll */
     pthread_t thread;
     int started;
     pthread_mutex_t mutex; /* of what follows */
@@ -164,6 +167,9 @@ void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
     }
     for (int32_t i = 0; i < o->n; i++) {
         mhi_ring_put(o->outlets[i].ring, o->record);
+        if (o->outlets[i].ops->poll == NULL) {
+            (void)sem_post(&o->outlets[i].filled); /* waits for nobody */
+        }
     }
 }
 
@@ -199,9 +205,14 @@ static mhe_status take(outlet *s, int64_t lost, mhe_error *err) {
     return s->ops->take(s->self, &sample, err);
 }
 
-static void rest(double seconds) {
-    const struct timespec t = {0, (long)(1e9 * seconds)};
-    (void)nanosleep(&t, NULL);
+/* Until there is something in the ring, or LOOK is over. */
+static void wait_filled(outlet *s) {
+    struct timespec until;
+    (void)clock_gettime(CLOCK_REALTIME, &until); /* sem_timedwait knows no other */
+    until.tv_nsec += (long)(1e9 * LOOK);
+    until.tv_sec += until.tv_nsec / 1000000000;
+    until.tv_nsec %= 1000000000;
+    (void)sem_timedwait(&s->filled, &until);
 }
 
 static void *work(void *data) {
@@ -219,7 +230,7 @@ static void *work(void *data) {
         } else if (s->ops->poll != NULL && status >= 0) {
             status = s->ops->poll(s->self, IDLE, &err);
         } else {
-            rest(IDLE);
+            wait_filled(s);
         }
         if (status != MHE_OK && !told) { /* one that fails for good gets nothing any more */
             told = 1;
@@ -242,6 +253,7 @@ static mhe_status start_one(mhi_outlets *o, outlet *s, const mhi_outlets_setup *
     s->ops = use->plugin->ops;
     s->id = use->plugin->id;
     (void)pthread_mutex_init(&s->mutex, NULL);
+    (void)sem_init(&s->filled, 0, 0);
     s->ring = mhi_ring_create(RING, HEAD + o->n_values);
     s->record = MHI_TAKE(&o->arena, double, HEAD + o->n_values);
     if (s->ring == NULL || s->record == NULL) {
@@ -317,6 +329,7 @@ void mhi_outlets_stop(mhi_outlets *o) {
     for (int32_t i = 0; i < o->n; i++) {
         outlet *s = &o->outlets[i];
         if (s->started) {
+            (void)sem_post(&s->filled);
             (void)pthread_join(s->thread, NULL);
         } else if (s->opened) {
             (void)s->ops->close(s->self, NULL);
@@ -327,6 +340,7 @@ void mhi_outlets_stop(mhi_outlets *o) {
         mhi_figure_view_close(&s->view);
         mhi_ring_free(s->ring);
         (void)pthread_mutex_destroy(&s->mutex);
+        (void)sem_destroy(&s->filled);
     }
     free(o->outlets);
     mhi_figure_close(&o->figure);

@@ -9,7 +9,6 @@
 
 #define RK "mhe.integrator.rk"
 #define FINE "{stages: 4, max_step: 0.015, activation_step: 1.7, tolerance: 5e-6}"
-#define N_FLAGS 4 /* all combinations of SYSTEM_EXCITATION and SYSTEM_RESIDUALS */
 
 static const char *const schemes[] = {"stages: 1",
                                       "stages: 2",
@@ -19,36 +18,9 @@ static const char *const schemes[] = {"stages: 1",
                                       "{stages: 2, max_step: 0.007}"};
 #define N_SCHEMES (sizeof schemes / sizeof schemes[0])
 
-static void random_state(uint64_t *seed, const mhe_system *system, double *x, double *u) {
-    for (int32_t i = 0; i < system->n_x; i++) {
-        x[i] = i < 4 ? test_random(seed, -1.2, 1.2) * (i < 2 ? 1 : 4) : test_random(seed, 0, 1);
-    }
-    for (int32_t i = 0; i < system->n_u; i++) {
-        u[i] = i < SYSTEM_M ? test_random(seed, 0, 1) : test_random(seed, -3, 3);
-    }
-}
-
 static void derivatives(void **state) {
     (void)state;
-    uint64_t seed = 5;
-    double worst = 0;
-    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
-        mhe_system system;
-        test_pendulum_system(flags, &system);
-        for (size_t k = 0; k < N_SCHEMES; k++) {
-            struct test_integrator rk = test_integrator_open(RK, schemes[k], &system, NULL);
-            for (int trial = 0; trial < 10; trial++) {
-                double x[SYSTEM_X], u[SYSTEM_U];
-                random_state(&seed, &system, x, u);
-                double error = test_step_derivatives(&rk, x, u, test_random(&seed, 0.01, 0.05));
-                assert_true(error >= 0);
-                worst = fmax(worst, error);
-            }
-            test_integrator_close(&rk);
-        }
-    }
-    print_message("A, B against differences: %.1e\n", worst);
-    assert_true(worst < 1e-6);
+    test_derivatives_of_steps(RK, schemes, N_SCHEMES, 10, 0.01, 0.05, 1e-6);
 }
 
 /* The step with derivatives ends where the step without them does. */
@@ -62,7 +34,7 @@ static void same_step_with_derivatives(void **state) {
     for (int trial = 0; trial < 50; trial++) {
         double x[SYSTEM_X], u[SYSTEM_U], plain[SYSTEM_X], full[SYSTEM_X];
         double A[SYSTEM_X * SYSTEM_X], B[SYSTEM_X * SYSTEM_U];
-        random_state(&seed, &system, x, u);
+        test_pendulum_state(&seed, &system, x, u);
         test_integrate(&rk, x, u, 0.03, plain, NULL, NULL);
         test_integrate(&rk, x, u, 0.03, full, A, B);
         worst = fmax(worst, test_relative(plain, full, system.n_x));
@@ -78,14 +50,14 @@ static void same_step_with_derivatives(void **state) {
 static void memory_of(const char *yaml, double most) {
     uint64_t seed = 12;
     double worst = 0, worst_derivative = 0;
-    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+    for (int32_t flags = 0; flags < SYSTEM_N_FLAGS; flags++) {
         mhe_system system;
         test_pendulum_system(flags, &system);
         struct test_integrator rk = test_integrator_open(RK, yaml, &system, NULL);
         double *kept = calloc((size_t)rk.ops->memory_size(rk.self), sizeof *kept);
         double x[SYSTEM_X], u[SYSTEM_U];
         assert_non_null(kept);
-        random_state(&seed, &system, x, u);
+        test_pendulum_state(&seed, &system, x, u);
         for (int trial = 0; trial < 200; trial++) {
             double next[2][SYSTEM_X], A[2][SYSTEM_X * SYSTEM_X], B[2][SYSTEM_X * SYSTEM_U];
             double move = pow(10, test_random(&seed, -9, -0.5)), dt = trial % 17 < 14 ? 0.03 : 0.02;
@@ -137,7 +109,7 @@ static double mean_error(const mhe_system *system, const char *scheme, double ma
     double sum = 0;
     for (int trial = 0; trial < 10; trial++) {
         double x[SYSTEM_X], u[SYSTEM_U], next[SYSTEM_X], exact[SYSTEM_X];
-        random_state(&seed, system, x, u);
+        test_pendulum_state(&seed, system, x, u);
         test_integrate(&rk, x, u, 0.08, next, NULL, NULL);
         test_integrate(&fine, x, u, 0.08, exact, NULL, NULL);
         sum += test_relative(next, exact, 4);
@@ -207,7 +179,7 @@ static void exponential(const double *a, int n, double *out) {
 static void linear_system(void **state) {
     (void)state;
     uint64_t seed = 9;
-    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+    for (int32_t flags = 0; flags < SYSTEM_N_FLAGS; flags++) {
         mhe_system system;
         test_linear_system(flags, &system);
         int32_t n_x = system.n_x, n_u = system.n_u, n = n_x + n_u;
@@ -219,7 +191,7 @@ static void linear_system(void **state) {
             rate[i] *= dt;
         }
         exponential(rate, n, flow);
-        random_state(&seed, &system, x, u);
+        test_pendulum_state(&seed, &system, x, u);
         struct test_integrator rk = test_integrator_open(RK, FINE, &system, NULL);
         test_integrate(&rk, x, u, dt, next, A, B);
         for (int32_t i = 0; i < n_x; i++) {
@@ -261,7 +233,7 @@ static void against_cvodes(void **state) {
     (void)state;
     uint64_t seed = 10;
     double worst = 0, worst_derivative = 0;
-    for (int32_t flags = 0; flags < N_FLAGS; flags++) {
+    for (int32_t flags = 0; flags < SYSTEM_N_FLAGS; flags++) {
         mhe_system system;
         test_pendulum_system(flags, &system);
         struct test_integrator rk = test_integrator_open(RK, FINE, &system, NULL);
@@ -274,7 +246,7 @@ static void against_cvodes(void **state) {
         for (int trial = 0; trial < 30; trial++) {
             double x[SYSTEM_X], u[SYSTEM_U], next[2][SYSTEM_X];
             double A[2][SYSTEM_X * SYSTEM_X], B[2][SYSTEM_X * SYSTEM_U];
-            random_state(&seed, &system, x, u);
+            test_pendulum_state(&seed, &system, x, u);
             double dt = test_random(&seed, 0.01, 0.06);
             test_integrate(&rk, x, u, dt, next[0], A[0], B[0]);
             test_integrate(&reference, x, u, dt, next[1], A[1], B[1]);
