@@ -51,8 +51,8 @@ wait $pid
 status=$?
 ended twice 'interrupted after' 9
 
-# In a solve that takes long: 7 intervals of 10 000 steps, iteration by iteration.
-interrupted slow --set integrator.max_step=3e-6
+# In a solve that takes long: 7 intervals of 30 000 steps, iteration by iteration, without the limit of work.
+interrupted slow --set integrator.max_step=1e-6 --set realtime.deadline_ms=600000
 ended slow 'interrupted' 0
 
 # In a plugin that never comes back.
