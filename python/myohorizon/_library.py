@@ -81,6 +81,8 @@ def encode(path_or_text):
     return data
 
 
+# The struct before the callbacks that take it: cffi 2.0 aborts where a function's type is first met within itself.
+ffi.sizeof("mhe_host")
 
 
 @ffi.callback("python_log")
