@@ -81,8 +81,9 @@ def encode(path_or_text):
     return data
 
 
-# The struct before the callbacks that take it: cffi 2.0 aborts where a function's type is first met within itself.
-ffi.sizeof("mhe_host")
+# Structs before the callbacks that take them: cffi 2.0 aborts where a function's type is first met within itself.
+for _struct in ("mhe_host", "mhe_own_costs", "mhe_problem"):
+    ffi.sizeof(_struct)
 
 
 @ffi.callback("python_log")
