@@ -177,13 +177,11 @@ static mhe_status loads_evaluate(const void *self, const mhe_force_point *at,
                                  const mhe_force_values *out, mhe_error *err) {
     const struct loads *s = self;
     (void)err;
-    for (int32_t i = 0; i < s->n_w; i++) {
-        if (out->load != NULL) {
-            out->load[i] = at->input[i];
-        }
-        if (out->load_w != NULL) {
-            out->load_w[i * s->n_w + i] = 1;
-        }
+    if (out->load != NULL) {
+        memcpy(out->load, at->input, sizeof *out->load * (size_t)s->n_w);
+    }
+    for (int32_t i = 0; i < s->n_w && out->load_w != NULL; i++) {
+        out->load_w[i * s->n_w + i] = 1;
     }
     return MHE_OK;
 }

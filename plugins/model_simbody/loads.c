@@ -89,8 +89,8 @@ static void add_force(const simbody_context *c, int32_t link, const double *forc
 
 /* What turning joint j changes: it carries the load's body (`below`), its axes, its origin, or not.
  * That it moves the axis of a joint i beyond it counts as (S_j x S_i) . F = -S_i . (S_j x* F). */
-static void turn_joint(const simbody_context *c, const ground_load *load, const double *force,
-                       int32_t j, int below, double *tau_q) {
+static inline void turn_joint(const simbody_context *c, const ground_load *load,
+                              const double *force, int32_t j, int below, double *tau_q) {
     const tree *t = c->tree;
     const int with_axes = load->axes >= 0 && carries(t, j, load->axes);
     const int with_origin =

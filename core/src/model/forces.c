@@ -123,6 +123,8 @@ mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_e
             s->most_paths = larger(s->most_paths, f->layout.n_paths);
             s->most_loads = larger(s->most_loads, f->layout.n_loads);
             s->most_pairs = larger(s->most_pairs, f->layout.n_pairs);
+            s->forces_see_rates |=
+                f->layout.generalised || f->layout.n_paths > 0 || f->layout.n_pairs > 0;
         }
     }
     return status;
@@ -296,7 +298,7 @@ mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at
     mhe_status status = MHE_OK;
     zero(c->other, n_q);
     zero(c->other_q, derivatives ? n_q * n_q : 0);
-    zero(c->other_v, derivatives ? n_q * n_q : 0);
+    zero(c->other_v, derivatives && s->forces_see_rates ? n_q * n_q : 0);
     for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
         status = evaluate_one(c, &s->forces[i], at, derivatives, err);
         if (status == MHE_OK) {

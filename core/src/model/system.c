@@ -147,13 +147,16 @@ static mhe_status kinematics(mhi_system_context *c, const double *q, const doubl
 }
 
 /* moment' + other' - tau' into n_q columns of a row-major matrix of `ld`. */
-static void torque_derivative(const mhi_system_context *c, const double *moment_d,
-                              const double *other_d, const double *tau_d, double *out, int32_t ld) {
-    const int32_t n_q = c->system->face.n_q, others = c->system->n_forces > 0;
+static inline void torque_derivative(const mhi_system_context *c, const double *moment_d,
+                                     const double *other_d, const double *tau_d, double *out,
+                                     int32_t ld) {
+    const int32_t n_q = c->system->face.n_q;
     for (int32_t i = 0; i < n_q; i++) {
         for (int32_t j = 0; j < n_q; j++) {
-            const double other = others ? other_d[i * n_q + j] : 0;
-            out[i * ld + j] = moment_d[i * n_q + j] - tau_d[i * n_q + j] + other;
+            out[i * ld + j] = moment_d[i * n_q + j] - tau_d[i * n_q + j];
+        }
+        for (int32_t j = 0; j < n_q && other_d != NULL; j++) {
+            out[i * ld + j] += other_d[i * n_q + j];
         }
     }
 }
@@ -162,8 +165,10 @@ static void torque_derivative(const mhi_system_context *c, const double *moment_
  * in place: c->solved [n_q x 3 n_q]. */
 static void solve_derivatives(mhi_system_context *c) {
     const int32_t n_q = c->system->face.n_q, ld = 3 * n_q;
-    torque_derivative(c, c->moment_q, c->other_q, c->tau_q, c->solved, ld);
-    torque_derivative(c, c->moment_v, c->other_v, c->tau_v, c->solved + n_q, ld);
+    const double *other_q = c->system->n_forces > 0 ? c->other_q : NULL;
+    const double *other_v = c->system->forces_see_rates ? c->other_v : NULL;
+    torque_derivative(c, c->moment_q, other_q, c->tau_q, c->solved, ld);
+    torque_derivative(c, c->moment_v, other_v, c->tau_v, c->solved + n_q, ld);
     for (int32_t i = 0; i < n_q; i++) {
         memset(c->solved + i * ld + 2 * n_q, 0, doubles(n_q));
         c->solved[i * ld + 2 * n_q + i] = 1;

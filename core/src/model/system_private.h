@@ -43,6 +43,7 @@ struct mhi_system {
     mhi_force *forces;
     int32_t n_forces;                                        /* that do something */
     int32_t most_inputs, most_paths, most_loads, most_pairs; /* of one force */
+    int32_t forces_see_rates;        /* one may depend on velocities: loads alone do not */
     int32_t n_residual, n_actuators; /* controls r: residual torques, actuators */
     int32_t n_c;                     /* rows of the description's loops */
     mhe_load *loop_loads;            /* [n_loop_loads] what closes them acts on */
