@@ -158,8 +158,8 @@ static void add_group(mhi_text *out, const view_tables *t, const quantity *q, in
 
 void view_add_panels(mhi_text *out, const view_tables *t) {
     const quantity all[] = {
-        {"Joint coordinates (of a slider, 1 deg is 17.5 mm)", t->q_prefix, "deg", VIEW_Q, -1, VIEW_TRUTH,
-         VIEW_SD, "q_", "q_", MHI_DEGREES, 1},
+        {"Joint coordinates (of a slider, 1 deg is 17.5 mm)", t->q_prefix, "deg", VIEW_Q, -1,
+         VIEW_TRUTH, VIEW_SD, "q_", "q_", MHI_DEGREES, 1},
         {"Activation against EMG", t->a_prefix, "of 1", VIEW_ACTIVATION, VIEW_EMG, VIEW_TRUTH,
          VIEW_SD, "a_", "a_", 1, 0.1},
         {"Muscle forces", "", "N", VIEW_FORCE, -1, VIEW_TRUTH, VIEW_SD, "F_", "force_", 1, 10},

@@ -73,12 +73,11 @@ static void take_request(client *c, const char *page, size_t size) {
     }
     c->n += (size_t)n;
     c->request[c->n] = '\0';
-    if (strlen(c->request) < c->n) {
-        drop(c); /* no text */
-    } else if (strstr(c->request, "\r\n\r\n") != NULL) {
+    const int is_text = strlen(c->request) == c->n;
+    if (is_text && strstr(c->request, "\r\n\r\n") != NULL) {
         answer(c, page, size);
-    } else if (c->n == sizeof c->request - 1) {
-        drop(c); /* no browser asks for so much */
+    } else if (!is_text || c->n == sizeof c->request - 1) { /* no browser asks for so much */
+        drop(c);
     }
 }
 
