@@ -2,6 +2,7 @@
 /* Sweeps of every coordinate of public models in 400 steps: lengths jump where a conditional point
  * goes on or off, and where docs/paths.md says so. */
 #include "json.h"
+#include "public_models.h"
 #include "support.h"
 
 #include <mhe/inspect.h>
@@ -21,32 +22,6 @@ static const struct {
              {"MOBL_ARMS_41", "CORB", 1},
              {"ThoracoscapularShoulderModel", "TeresMajor", 3}};
 #define N_KNOWN (sizeof known / sizeof known[0])
-
-static const char *const models[] = {"arm26",
-                                     "gait10dof18musc",
-                                     "subject01_metabolics_path_spring",
-                                     "gait2354_simbody",
-                                     "gait2392_thelen2003muscle",
-                                     "gait2392_millard2012muscle",
-                                     "FullBodyModel_Hamner2010_v2_0",
-                                     "leg39",
-                                     "Rajagopal2016",
-                                     "RajagopalLaiUhlrich2023",
-                                     "wrist",
-                                     "Tug_of_War_Millard",
-                                     "MOBL_ARMS_41",
-                                     "Wu_Shoulder_Model_via_points",
-                                     "ThoracoscapularShoulderModel",
-                                     "HYOID",
-                                     "testMomentArmsConstraintA",
-                                     "testMomentArmsConstraintB",
-                                     "PathOnConstrainedBodyMomentArmTest",
-                                     "MovingPathPointMomentArmTest",
-                                     "MultipleMPPsMomentArmTest",
-                                     "CoupledCoordinatesMPPsMomentArmTest",
-                                     "WrapPathCustomJointMomentArmTest",
-                                     "P2PBallJointMomentArmTest",
-                                     "toyLigamentModel"};
 
 static void sweep_model(const char *name, int *conditional, int *others) {
     char file[256], path[1024], *text = NULL;
@@ -89,8 +64,8 @@ static void sweep_model(const char *name, int *conditional, int *others) {
 static void lengths_jump_only_where_it_is_known(void **state) {
     (void)state;
     int conditional = 0, others = 0;
-    for (size_t i = 0; i < sizeof models / sizeof models[0]; i++) {
-        sweep_model(models[i], &conditional, &others);
+    for (int i = 0; i < N_PUBLIC_MODELS; i++) {
+        sweep_model(public_models[i], &conditional, &others);
     }
     print_message("25 models: %d jumps at conditional points, %d others\n", conditional, others);
     assert_true(conditional > 0);

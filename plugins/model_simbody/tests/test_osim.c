@@ -3,6 +3,7 @@
  * same for it alone, with every path that is far off. What is behind the numbers stands in
  * docs/paths.md. */
 #include "json.h"
+#include "public_models.h"
 #include "test_models.h"
 
 #include "io/model_file.h"
@@ -17,33 +18,6 @@
 
 #define MAX_Q 64
 #define MAX_P 128
-
-static const char *const models[] = {"arm26",
-                                     "gait10dof18musc",
-                                     "subject01_metabolics_path_spring",
-                                     "gait2354_simbody",
-                                     "gait2392_thelen2003muscle",
-                                     "gait2392_millard2012muscle",
-                                     "FullBodyModel_Hamner2010_v2_0",
-                                     "leg39",
-                                     "Rajagopal2016",
-                                     "RajagopalLaiUhlrich2023",
-                                     "wrist",
-                                     "Tug_of_War_Millard",
-                                     "MOBL_ARMS_41",
-                                     "Wu_Shoulder_Model_via_points",
-                                     "ThoracoscapularShoulderModel",
-                                     "HYOID",
-                                     "testMomentArmsConstraintA",
-                                     "testMomentArmsConstraintB",
-                                     "PathOnConstrainedBodyMomentArmTest",
-                                     "MovingPathPointMomentArmTest",
-                                     "MultipleMPPsMomentArmTest",
-                                     "CoupledCoordinatesMPPsMomentArmTest",
-                                     "WrapPathCustomJointMomentArmTest",
-                                     "P2PBallJointMomentArmTest",
-                                     "toyLigamentModel"};
-#define N_MODELS ((int)(sizeof models / sizeof models[0]))
 
 static int verbose;
 
@@ -288,9 +262,9 @@ static const char *only;
 
 static void lengths_are_those_of_opensim(void **state) {
     (void)state;
-    for (int i = 0; i < N_MODELS; i++) {
-        if (only == NULL || strcmp(only, models[i]) == 0) {
-            compare_model(models[i]);
+    for (int i = 0; i < N_PUBLIC_MODELS; i++) {
+        if (only == NULL || strcmp(only, public_models[i]) == 0) {
+            compare_model(public_models[i]);
         }
     }
     if (only == NULL) {
