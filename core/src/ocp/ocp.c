@@ -21,7 +21,10 @@ int32_t mhi_ocp_find_signal(const mhe_problem *problem, const char *name, int32_
             return i;
         }
     }
-    return -1;
+    const size_t prefix = strlen(MHI_REACTION);
+    const int32_t row =
+        strncmp(name, MHI_REACTION, prefix) == 0 ? mhi_ocp_open_joint(problem->data, name) : -1;
+    return row < 0 ? -1 : mhi_ocp_find_signal(problem, name, n_y, unit);
 }
 
 const char *const *mhi_ocp_entry_names(const mhe_problem *problem, int32_t signal) {
@@ -165,8 +168,7 @@ static mhe_status evaluate_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k
     const int derivatives = wants_derivatives(out);
     const int32_t n_carried = ocp->signals.n_carried;
     const int32_t n_z = u == NULL && n_carried == 0 ? ocp->n_x : ocp->signals.n_z + n_carried;
-    mhe_status status = mhi_signals_evaluate(&ocp->signals, ocp->system, w->system, ocp->wanted, x,
-                                             u, w->y, derivatives ? w->jacobian : NULL, err);
+    mhe_status status = mhi_ocp_measure(ocp, w, k, ocp->wanted, x, u, derivatives, err);
     if (status != MHE_OK) {
         return status;
     }
@@ -302,6 +304,7 @@ void mhi_ocp_free(mhi_ocp *ocp) {
         if (ocp->workers[i].integrator != NULL) {
             ocp->integrator->context_destroy(ocp->workers[i].integrator);
         }
+        mhi_ocp_leave_joints(&ocp->workers[i]);
         mhi_system_context_free(ocp->workers[i].system);
     }
     if (ocp->integrator_self != NULL) {
@@ -310,6 +313,7 @@ void mhi_ocp_free(mhi_ocp *ocp) {
     for (int32_t i = 0; i < ocp->n_terms_created; i++) {
         mhi_term_destroy(&ocp->terms[i]);
     }
+    mhi_ocp_close_joints(ocp);
     mhi_arena_free(&ocp->arena);
     free(ocp);
 }
@@ -451,7 +455,7 @@ mhe_status mhi_ocp_extend(mhi_ocp *ocp, int32_t k, const double *x, const double
     }
     mhe_status status = mhi_ocp_linearise(ocp, k, x, u, x_next, w->A, w->B, err);
     w->linearised = 0;
-    return status == MHE_OK ? mhi_ocp_carry_on(ocp, w, x, u, x_next, err) : status;
+    return status == MHE_OK ? mhi_ocp_carry_on(ocp, w, k, x, u, x_next, err) : status;
 }
 
 int32_t mhi_ocp_n_x(const mhi_ocp *ocp) {
