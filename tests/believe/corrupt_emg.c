@@ -55,6 +55,18 @@ static double largest(recording *r) {
 static void emg_baseline(recording *r) {
     gain(r, 1, 0.3 * largest(r));
 }
+static void emg_offset(recording *r) {
+    gain(r, 1, 0.1 * largest(r));
+}
+static void emg_hum(recording *r) { /* 50 Hz, or what is left of it in an envelope */
+    const double size = 0.2 * largest(r);
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        const double hum = r->emg->rate > 200 ? sin(100 * acos(-1) * r->emg->time[k]) : 0.5;
+        for (int32_t i = 0; i < r->emg->n_columns; i++) {
+            *corrupt_cell(r->emg, k, i) += size * hum;
+        }
+    }
+}
 static void emg_inverted(recording *r) {
     gain(r, -1, largest(r));
 }
@@ -110,6 +122,11 @@ static void emg_late(recording *r) {
         r->emg->time[k] += 0.3;
     }
 }
+static void emg_later(recording *r) {
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        r->emg->time[k] += 0.15;
+    }
+}
 static void emg_early(recording *r) {
     for (int32_t k = 0; k < r->emg->n_rows; k++) {
         r->emg->time[k] -= 0.3;
@@ -154,6 +171,8 @@ const corruption corrupt_emg[] = {
     {"emg_negative", "EMG: wrong sign", emg_negative},
     {"emg_inverted", "EMG: upside down", emg_inverted},
     {"emg_baseline", "EMG: an offset of 30 % of its peak", emg_baseline},
+    {"emg_offset", "EMG: an offset of 10 % of its peak", emg_offset},
+    {"emg_hum", "EMG: mains hum in all channels", emg_hum},
     {"emg_own_peak", "EMG: scaled to each channel's peak", emg_own_peak},
     {"emg_zero", "EMG: all zeros", emg_zero},
     {"emg_dead", "EMG: the strongest channel zero", emg_dead},
@@ -163,6 +182,7 @@ const corruption corrupt_emg[] = {
     {"emg_frozen", "EMG: repeats one sample for 75 %", emg_frozen},
     {"emg_part", "EMG: half of the trial", emg_part},
     {"emg_late", "EMG: 0.3 s late", emg_late},
+    {"emg_later", "EMG: 0.15 s late", emg_later},
     {"emg_early", "EMG: 0.3 s early", emg_early},
     {"emg_clock", "EMG: clock 25 % slow", emg_clock},
     {"emg_clipped", "EMG: cut off at 15 % of its peak", emg_clipped},

@@ -13,6 +13,10 @@
 #define MARKERS_FAR \
     0.008 /* m RMS over all markers: angles may be 2 degrees off (docs/believability.md) */
 #define MARKERS_LOST 0.06
+#define LATE 0.04        /* s that EMG seems late; the electromechanical delay is as large */
+#define EARLY (-0.02)    /* s */
+#define LATE_SHARE 0.15  /* of the difference that this explains at least */
+#define LONG 0.1         /* s between nodes: excitation does not change there */
 #define MARKER_FAR 0.025 /* m RMS of a single one, and ... */
 #define STANDS_OUT 3.0   /* ... times the median marker's */
 #define DOUBTED 0.2      /* of a marker's or channel's samples not believed */
@@ -76,6 +80,15 @@ static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
                          "is the model scaled to this person, do labels and markers' places agree?",
                          "the markers are %.1f mm from the estimate (RMS)", 1e3 * all);
     }
+    const mhi_stretch *w = &d->worst;
+    const double part = w->n > 0 ? sqrt(w->squares / w->n) : 0;
+    if (all <= MARKERS_FAR && part > MARKERS_FAR) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "what changed there: the system, a marker, the person's place?",
+                         "the markers are %.1f mm from the estimate (RMS) from %.4g to %.4g s, "
+                         "%.1f mm over all",
+                         1e3 * part, w->from, w->to, 1e3 * all);
+    }
     for (int32_t i = 0; i < f->n_markers; i++) {
         const double rms = mhi_tally_rms(&d->markers[i]);
         const int32_t left_out = d->markers[i].left_out;
@@ -127,6 +140,24 @@ static void judge_emg(const mhi_diagnosis *d, mhi_findings *findings) {
                          100.0 * doubted / n);
     }
     mhi_text_free(&far);
+}
+
+static void judge_times(const mhi_diagnosis *d, mhi_findings *findings) {
+    double share;
+    const double late = mhi_lag_seconds(&d->lag, &share);
+    if (share > LATE_SHARE && (late > LATE || late < EARLY)) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "have EMG and markers one clock? data.emg_offset moves the EMG, delay of "
+                         "an electrode is its electromechanical delay",
+                         "the EMG seems %s by %.0f ms or more", late > 0 ? "late" : "early",
+                         1e3 * fabs(late));
+    }
+    const double interval = d->info->ratio / d->recording->rate;
+    if (interval > LONG) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "smaller horizon.ratio, or more frames a second",
+                         "%.3g s between nodes: muscles change faster", interval);
+    }
 }
 
 static void judge_bounds(const mhi_diagnosis *d, mhi_findings *findings) {
@@ -210,6 +241,7 @@ void mhi_diagnosis_judge(const mhi_diagnosis *d, mhi_findings *findings) {
         judge_solves(d, findings);
         judge_markers(d, findings);
         judge_emg(d, findings);
+        judge_times(d, findings);
         judge_bounds(d, findings);
         judge_torques(d, findings);
     }
