@@ -14,6 +14,7 @@
 #include <string.h>
 
 #define MAX_PASSES 8
+#define FULL_TURN 6.283185307179586
 
 static void link_place(const path_pose *pose, int32_t link, const double *at, double *out) {
     if (link < 0) {
@@ -356,6 +357,24 @@ static int32_t order_idle(const route_work *work) {
     return -1;
 }
 
+/* A wrap beside other strings that only its side, and not the way, makes go a whole turn about. */
+static int32_t order_about(const path_route *route, const route_work *work) {
+    for (int32_t i = 0; i < work->n_pieces; i++) {
+        const course_piece *piece = &work->pieces[i];
+        int32_t w = piece->wrap;
+        if (w < 0 || work->state[w] != WRAP_POSSIBLE ||
+            (piece->joint[0] < 0 && piece->joint[1] < 0)) {
+            continue;
+        }
+        const double *tried = work->tried + 6 * w;
+        double longer = wrap_length(&work->strings[w]) - distance3(tried, tried + 3);
+        if (longer > FULL_TURN * route->wraps[w].surface.size[0]) {
+            return w;
+        }
+    }
+    return -1;
+}
+
 /* The course without what holds no string. 0: each string of a row is clear of the others. */
 static int course_try(const path_route *route, const path_pose *pose, const double *numbers,
                       int pushes, route_work *work) {
@@ -377,7 +396,10 @@ static int course_try(const path_route *route, const path_pose *pose, const doub
         if (route->n_wraps > 1) {
             strings_renew(route, work);
         }
-        idle = work->n_joints > 0 ? joints_tighten(route, work) : -1;
+        idle = route->n_wraps > 1 ? order_about(route, work) : -1;
+        if (idle < 0 && work->n_joints > 0) {
+            idle = joints_tighten(route, work);
+        }
         idle = idle < 0 ? order_idle(work) : idle;
         if (idle >= 0) {
             order_bar(work, idle);

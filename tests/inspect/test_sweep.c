@@ -17,9 +17,8 @@
 static const struct {
     const char *model, *path;
     int jumps;
-} known[] = {{"MOBL_ARMS_41", "TMIN", 2},
+} known[] = {{"MOBL_ARMS_41", "TMIN", 1},
              {"MOBL_ARMS_41", "TRIlong", 1},
-             {"MOBL_ARMS_41", "CORB", 1},
              {"ThoracoscapularShoulderModel", "TeresMajor", 3}};
 #define N_KNOWN (sizeof known / sizeof known[0])
 

@@ -30,6 +30,7 @@ typedef struct wrap_string {
     double arc;              /* length on the surface */
     double field[4];         /* j, j' at b of (1, 0) at a; of (0, 1) at a */
     int32_t held;            /* a shorter one may lie on the other side than asked for */
+    double other;            /* how much the other way round a cylinder counts, 0 .. 0.5 */
 } wrap_string;
 
 #define WRAP_INSIDE (-1)   /* an end is inside: no wrap */
