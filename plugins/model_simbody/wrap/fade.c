@@ -216,10 +216,15 @@ static void fade_over(const wrap_surface *surface, const double *p, const double
                       const wrap_string *string, jet *length) {
     wrap_string strings[2];
     jet shortest, pass, excess, share;
-    if (!wrap_slips(surface, p, s, string, &strings[0], &strings[1])) {
+    if (string->held == WRAP_HELD_WHOLE ||
+        !wrap_slips(surface, p, s, string, &strings[0], &strings[1])) {
         return;
     }
     wrap_jet(&strings[0], &shortest);
+    if (string->held == WRAP_HELD_NOT) {
+        *length = shortest;
+        return;
+    }
     jet_add(length, -1, &shortest, &excess);
     double most = FADE_PASS * excess.value, high = wrap_length(&strings[1]) - length->value;
     if (high >= most) {
