@@ -81,6 +81,7 @@ static int32_t order_about(const path_route *route, const route_work *work) {
 static int course_try(const path_route *route, const path_pose *pose, const double *numbers,
                       int pushes, route_work *work) {
     int32_t idle = -1;
+    work->lost = -1;
     work->pushes = pushes;
     work->pushed = 0;
     work->n_order = 0;
@@ -97,6 +98,7 @@ static int course_try(const path_route *route, const path_pose *pose, const doub
         }
         idle = idle < 0 ? order_idle(work) : idle;
         if (idle >= 0) {
+            work->lost = work->n_joints > 0 ? idle : work->lost;
             order_bar(work, idle);
         }
     } while (idle >= 0);

@@ -8,6 +8,9 @@
  *   touches its own, the path would go over the other one alone, and be longer: with C without both
  *   and B without the one in the way, by itself not touched then,
  *       L = A + (1 - S((A - C) / (k (B - C)))) (B - A).
+ * - Where of two obstacles the one that is off would be touched by the course over the other, and
+ *   they have no course over both, the path is as long as the longer of both alone, rounded where
+ *   they differ by less than NEAR: with D = A - B, L = B + S((D / NEAR + 1) / 2) D.
  * - Of strings in a row one may be held on the side asked for. Where it would not be without the
  *   others they do not hold it either: with C without them, D that of the string held then and E
  *   of the shortest one,
@@ -20,6 +23,7 @@
 #include <string.h>
 
 #define RIVALS 0.25
+#define NEAR 1e-3  /* m */
 #define SAME 1e-12 /* m */
 #define VARIABLES 4
 
@@ -109,13 +113,44 @@ static int32_t rival_of(const path_route *route, const route_work *work, int32_t
     return -1;
 }
 
+/* The longer one. */
+static double mix_longer(const rival_case *c, const jet *a, const jet *b) {
+    jet apart, share;
+    jet_add(a, -1, b, &apart);
+    jet_apply(&apart, 0.5 * (apart.value / NEAR + 1), 0.5 / NEAR, 0, &share);
+    jet_rise(&share, &share);
+    jet_multiply(&share, &apart, &apart);
+    jet_add(b, 1, &apart, &apart);
+    return mixed(c, &apart);
+}
+
+/* A is that without `lost`, which held no string in a row with the other one. */
+static double mix_lost(const rival_case *c, int32_t lost, const jet *a) {
+    route_work *work = c->work;
+    jet b;
+    if (!course_touches(c->route, lost, work)) {
+        return mixed(c, a);
+    }
+    memset(work->without, 1, (size_t)c->route->n_wraps);
+    work->without[lost] = 0;
+    course_without(c->route, c->pose, c->numbers, work);
+    if (work->state[lost] <= 0) {
+        return mixed(c, a);
+    }
+    course_variable(c, 1, &b);
+    return mix_longer(c, a, &b);
+}
+
 static double mix_rivals(const rival_case *c, int32_t on, int32_t off, const jet *a) {
     route_work *work = c->work;
     jet b, without, share, step;
     work->without[on] = 1;
     course_without(c->route, c->pose, c->numbers, work);
     course_variable(c, 1, &b);
-    int free = work->state[off] > 0 && !course_touches(c->route, on, work);
+    int over = work->state[off] > 0, free = over && !course_touches(c->route, on, work);
+    if (over && !free && c->route->n_wraps == 2) {
+        return mix_longer(c, a, &b);
+    }
     if (free) {
         work->without[off] = 1;
         course_without(c->route, c->pose, c->numbers, work);
@@ -193,12 +228,16 @@ double route_length(const tree *t, const path_route *route, const path_pose *pos
     double value = strand_length(t, route, pose, work, stride, gradient, hessian);
     int32_t off = -1, on = route->n_wraps > 1 ? rival_of(route, work, &off) : -1;
     int32_t held = route->n_wraps > 1 && on < 0 ? row_held(work) : -1;
-    if (on < 0 && held < 0) {
+    int32_t lost = route->n_wraps == 2 && on < 0 && held < 0 ? work->lost : -1;
+    if (on < 0 && held < 0 && lost < 0) {
         return value;
     }
     rival_case c = {t, route, pose, numbers, work, gradient, hessian};
     jet a;
     variable(&c, 0, value, *stride, &a);
     *stride = route->n_own;
+    if (lost >= 0) {
+        return mix_lost(&c, lost, &a);
+    }
     return on >= 0 ? mix_rivals(&c, on, off, &a) : mix_held(&c, held, &a);
 }

@@ -95,6 +95,7 @@ typedef struct route_work {
     int32_t n_order;
     uint8_t *without;       /* [n_wraps]: 1: that one is left out */
     int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */
+    int32_t lost;           /* the last wrap that held no string in a row; -1: none */
     int32_t pushes, pushed; /* see wrap_try(): whether it may, whether it did */
     course_joint *joints;   /* [n_wraps] */
     course_piece *pieces;   /* [n_points + 2 n_wraps] */
