@@ -108,6 +108,33 @@ static void emg_as_raw(recording *r) { /* an alternating signal of that size */
         r->emg->values[i] *= 1.5 * corrupt_normal(r);
     }
 }
+static void emg_rectified(recording *r) {
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->emg->n_rows * r->emg->n_columns; i++) {
+        r->emg->values[i] = fabs(r->emg->values[i]);
+    }
+}
+static void emg_artefact(recording *r) { /* a cable moves: slow and large, in all channels */
+    const double size = 2 * largest(r);
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        const double swing = size * sin(2 * acos(-1) * r->emg->time[k]);
+        for (int32_t i = 0; i < r->emg->n_columns; i++) {
+            *corrupt_cell(r->emg, k, i) += r->emg->rate > 200 ? swing : fmax(0, 0.1 * swing);
+        }
+    }
+}
+static void emg_spikes(recording *r) {
+    const double size = 5 * largest(r);
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->emg->n_rows * r->emg->n_columns; i++) {
+        r->emg->values[i] += corrupt_uniform(r) < 0.002 ? size : 0;
+    }
+}
+static void emg_drift(recording *r) { /* an electrode dries: gains fall to a third */
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        for (int32_t i = 0; i < r->emg->n_columns; i++) {
+            *corrupt_cell(r->emg, k, i) *= 1 - 0.67 * k / r->emg->n_rows;
+        }
+    }
+}
 static void emg_frozen(recording *r) {
     for (int32_t k = r->emg->n_rows / 4 + 1; k < r->emg->n_rows; k++) {
         memcpy(corrupt_cell(r->emg, k, 0), corrupt_cell(r->emg, r->emg->n_rows / 4, 0),
@@ -179,6 +206,10 @@ const corruption corrupt_emg[] = {
     {"emg_rotate", "EMG: every label on the next channel", emg_rotate},
     {"emg_swap", "EMG: the two strongest exchanged", emg_swap},
     {"emg_as_raw", "EMG: alternating (raw as normalised)", emg_as_raw},
+    {"emg_rectified", "EMG: rectified before", emg_rectified},
+    {"emg_artefact", "EMG: a slow swing in all channels", emg_artefact},
+    {"emg_spikes", "EMG: spikes of five times its peak", emg_spikes},
+    {"emg_drift", "EMG: gains fall to a third", emg_drift},
     {"emg_frozen", "EMG: repeats one sample for 75 %", emg_frozen},
     {"emg_part", "EMG: half of the trial", emg_part},
     {"emg_late", "EMG: 0.3 s late", emg_late},

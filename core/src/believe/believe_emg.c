@@ -21,6 +21,8 @@
 #define REST 0.02       /* of the MVC: a muscle at rest, as far as forces are concerned */
 #define REST_SHARE 0.05 /* of the samples; people rest each muscle for longer in a recording */
 #define REST_CHANNELS 3 /* of so many and more one rests at times */
+#define MANY 6          /* of so many and more one rests nearly always; else ... */
+#define TENSE 0.25      /* ... in that share of the frames all have something in common */
 
 typedef struct channel {
     double low, high;
@@ -80,6 +82,20 @@ static mhe_status check_scale(const char *path, const channel *all, int32_t n, m
                                     : "raw EMG? The section emg with channels makes shares of it.");
     }
     return MHE_OK;
+}
+
+/* Share of the frames with EMG in which no channel is at rest. */
+static double tense_share(const mhi_recording *r, int32_t n_m) {
+    int32_t n = 0, n_tense = 0;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        double least = INFINITY;
+        for (int32_t i = 0; i < n_m; i++) {
+            least = fmin(least, r->emg[(ptrdiff_t)k * n_m + i]); /* passes NaN over */
+        }
+        n += isfinite(least);
+        n_tense += isfinite(least) && least > REST;
+    }
+    return n == 0 ? 0 : (double)n_tense / n;
 }
 
 /* One list of muscles a kind. */
@@ -145,6 +161,7 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
                          "are these volts, or shares of another unit? Divide by the MVC",
                          "%s: no muscle reaches %.0f %% of its MVC", path, 100 * QUIET);
     }
+    const double tense = tense_share(r, d->n_muscles);
     if (n_there >= REST_CHANNELS && n_restless == n_there) {
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
                          "an offset, mains hum or noise that was not taken off? Take off what each "
@@ -152,6 +169,13 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
                          "%s: none of %d muscles is ever at rest (below %.0f %% of its MVC; the "
                          "least is %.0f %%)",
                          path, n_there, 100 * REST, 100 * least);
+    } else if (n_there >= MANY && tense > TENSE) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an artefact that all channels have in common, hum, or a clock? High-pass "
+                         "raw EMG (20 Hz) before its envelope is made",
+                         "%s: all of %d muscles are active at once (above %.0f %% of the MVC) in "
+                         "%.0f %% of the frames",
+                         path, n_there, 100 * REST, 100 * tense);
     }
     mhi_text_free(&flat);
     mhi_text_free(&zero);

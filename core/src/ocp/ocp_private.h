@@ -98,4 +98,18 @@ mhe_status mhi_ocp_carry_on(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, co
 /* Inputs of interval k [n_w]; NULL: there are none. */
 double *mhi_ocp_inputs_at(const mhi_ocp *ocp, int32_t k);
 
+/* stage_cost.c: cost and derivatives of node k; of a node at which a junction begins or goes on.
+ * [hot] */
+mhe_status mhi_ocp_cost(const mhi_ocp *ocp, mhi_ocp_worker *worker, int32_t k, const double *x,
+                        const double *u, const mhe_stage_values *out, mhe_error *err);
+mhe_status mhi_ocp_junction_cost(const mhi_ocp *ocp, mhi_ocp_worker *worker, int32_t k,
+                                 const double *x, const double *u, const mhe_stage_values *out,
+                                 mhe_error *err);
+
+static inline int32_t mhi_ocp_wants_derivatives(const mhe_stage_values *out) {
+    return out->grad_x != NULL || out->grad_u != NULL || out->hess_xx != NULL ||
+           out->hess_ux != NULL || out->hess_uu != NULL || out->grad_p != NULL ||
+           out->hess_px != NULL || out->hess_pu != NULL || out->hess_pp != NULL;
+}
+
 #endif
