@@ -35,7 +35,8 @@ static const condition conditions[] = {
 
 typedef struct count {
     double held, of;             /* forces */
-    double by_muscle[N_M], each; /* of each muscle */
+    double by_muscle[N_M], each; /* of each muscle, and squares of ... */
+    double force[N_M], error[N_M], band[N_M];
     double angles, of_angles;
     double squares, variance; /* of errors, of bands */
 } count;
@@ -77,6 +78,9 @@ static void compare(const mhe_estimate *e, const mhi_recording *r, const double 
         const int32_t held = fabs(error) <= 1.96 * e->force_sd[m];
         to->held += held;
         to->by_muscle[m] += held;
+        to->force[m] += truth[m] * truth[m];
+        to->error[m] += error * error;
+        to->band[m] += e->force_sd[m] * e->force_sd[m];
         to->squares += error * error;
         to->variance += e->force_sd[m] * e->force_sd[m];
     }
@@ -154,10 +158,11 @@ static void table(int32_t draws, char **references, int32_t n) {
         (void)printf("%-14s %8.1f %8.1f %8.1f %8.1f %8s %10.2f %10.2f\n", conditions[i].name,
                      100 * c.held / c.of, 100 * least, 100 * most, 100 * c.angles / c.of_angles, "",
                      sqrt(c.squares / c.of), sqrt(c.variance / c.of));
-        for (int32_t m = 0; m < N_M; m++) {
-            (void)printf(" %.1f", 100 * c.by_muscle[m] / c.each);
+        for (int32_t m = 0; m < N_M; m++) { /* of each: share held, force, error and band */
+            (void)printf("    %2d %6.1f %8.1f %8.2f %8.2f\n", m, 100 * c.by_muscle[m] / c.each,
+                         sqrt(c.force[m] / c.each), sqrt(c.error[m] / c.each),
+                         sqrt(c.band[m] / c.each));
         }
-        (void)printf("\n");
         (void)fflush(stdout);
     }
 }
