@@ -18,14 +18,19 @@
 #define WHOLE 0.9       /* share of frames with EMG that is all but a filter's run-in */
 #define FLAT 0.3        /* s of one and the same value */
 #define FLAT_SHARE 0.02 /* of the recording */
+#define REST 0.02       /* of the MVC: a muscle at rest, as far as forces are concerned */
+#define REST_SHARE 0.05 /* of the samples; people rest each muscle for longer in a recording */
+#define REST_CHANNELS 3 /* of so many and more one rests at times */
+#define MANY 6          /* of so many and more one rests nearly always; else ... */
+#define TENSE 0.25      /* ... in that share of the frames all have something in common */
 
 typedef struct channel {
     double low, high;
-    int32_t n, n_below, n_beyond, n_flat;
+    int32_t n, n_below, n_beyond, n_flat, n_rest;
 } channel;
 
 static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
-    channel c = {INFINITY, -INFINITY, 0, 0, 0, 0};
+    channel c = {INFINITY, -INFINITY, 0, 0, 0, 0, 0};
     int32_t run = 0;
     double last = NAN;
     for (int32_t k = 0; k < r->n_frames; k++) {
@@ -35,7 +40,7 @@ static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
             run = 0;
             continue;
         }
-        run = value == last && value != 0 ? run + 1 : 0; /* 0 is a muscle at rest */
+        run = value == last && fabs(value) > REST ? run + 1 : 0; /* rest may be rounded */
         c.n_flat += run > FLAT * r->rate;
         last = value;
         c.low = fmin(c.low, value);
@@ -43,6 +48,7 @@ static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
         c.n++;
         c.n_below += value < BELOW;
         c.n_beyond += value > BEYOND;
+        c.n_rest += value < REST;
     }
     return c;
 }
@@ -78,11 +84,26 @@ static mhe_status check_scale(const char *path, const channel *all, int32_t n, m
     return MHE_OK;
 }
 
+/* Share of the frames with EMG in which no channel is at rest. */
+static double tense_share(const mhi_recording *r, int32_t n_m) {
+    int32_t n = 0, n_tense = 0;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        double least = INFINITY;
+        for (int32_t i = 0; i < n_m; i++) {
+            least = fmin(least, r->emg[(ptrdiff_t)k * n_m + i]); /* passes NaN over */
+        }
+        n += isfinite(least);
+        n_tense += isfinite(least) && least > REST;
+    }
+    return n == 0 ? 0 : (double)n_tense / n;
+}
+
 /* One list of muscles a kind. */
 static void check_channels(const char *path, const mhe_description *d, const mhi_recording *r,
                            const channel *all, mhi_findings *findings) {
     mhi_text flat = {0}, zero = {0}, own = {0}, below = {0}, beyond = {0};
-    int32_t n_own = 0, n_there = 0, n_quiet = 0;
+    int32_t n_own = 0, n_there = 0, n_quiet = 0, n_restless = 0;
+    double least = INFINITY;
     for (int32_t i = 0; i < d->n_muscles; i++) {
         const channel *c = &all[i];
         if (c->n == 0) {
@@ -90,6 +111,8 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
         }
         n_there++;
         n_quiet += c->high < QUIET;
+        n_restless += c->n_rest < REST_SHARE * c->n;
+        least = fmin(least, c->low);
         if (c->high == 0 && c->low == 0) {
             add_name(&zero, d->muscles[i].name);
         } else if (c->n_flat > FLAT_SHARE * r->n_frames) {
@@ -137,6 +160,22 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
                          "are these volts, or shares of another unit? Divide by the MVC",
                          "%s: no muscle reaches %.0f %% of its MVC", path, 100 * QUIET);
+    }
+    const double tense = tense_share(r, d->n_muscles);
+    if (n_there >= REST_CHANNELS && n_restless == n_there) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an offset, mains hum or noise that was not taken off? Take off what each "
+                         "channel shows at rest: it moves all forces up",
+                         "%s: none of %d muscles is ever at rest (below %.0f %% of its MVC; the "
+                         "least is %.0f %%)",
+                         path, n_there, 100 * REST, 100 * least);
+    } else if (n_there >= MANY && tense > TENSE) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an artefact that all channels have in common, hum, or a clock? High-pass "
+                         "raw EMG (20 Hz) before its envelope is made",
+                         "%s: all of %d muscles are active at once (above %.0f %% of the MVC) in "
+                         "%.0f %% of the frames",
+                         path, n_there, 100 * REST, 100 * tense);
     }
     mhi_text_free(&flat);
     mhi_text_free(&zero);
