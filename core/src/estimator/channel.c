@@ -296,7 +296,7 @@ void mhi_channel_spread(mhi_channel *c, int32_t filled, double *spread) {
     for (int32_t i = 0; i < width; i++) {
         const double n = now[i], mean = now[width + i] / n;
         const double square = n > 0 ? fmax(0, now[2 * width + i] / n - mean * mean) : NAN;
-        const double unseen = UNSEEN * UNSEEN * exp(-n * c->interval / SEEN_AFTER);
+        const double unseen = c->seen ? 0 : UNSEEN * UNSEEN * exp(-n * c->interval / SEEN_AFTER);
         c->varied[i] = sqrt(square);
         spread[i] = sqrt(square + unseen);
     }
