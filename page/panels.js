@@ -9,17 +9,22 @@ function row(cells) {
   for (const c of cells) { const td = document.createElement("td"); td.append(c); tr.append(td); }
   return tr;
 }
-function say(id, what, kind) { $(id).textContent = what; $(id).className = $(id).className.replace(/ ?(good|bad)/, "") + (kind ? " " + kind : ""); }
+function say(id, what, kind) { // what has not changed is left alone: each change makes the browser draw
+  const e = $(id), look = e.className.replace(/ ?(good|bad)/, "") + (kind ? " " + kind : "");
+  if (e.textContent !== what) e.textContent = what;
+  if (e.className !== look) e.className = look;
+}
 
 /* ---- streams, and labels that were not found ---- */
-let shown = "";
+let shown = "", listed = "";
 function showStreams(s) {
-  const streams = s.streams || [];
-  $("streams").replaceChildren(...streams.map(t => {
+  const streams = s.streams || [], rows = JSON.stringify(streams.map(t => [t.name, t.rate, t.found, t.of, t.state]));
+  if (rows !== listed) $("streams").replaceChildren(...streams.map(t => {
     const r = row([t.name, t.rate ? (+t.rate).toFixed(0) + " Hz" : "\u2013", t.found + " of " + t.of, t.state]);
     r.lastChild.className = t.state === "running" ? "good" : "bad";
     return r;
   }));
+  listed = rows;
   const key = JSON.stringify(streams.map(t => [t.missing, t.unused]));
   if (key === shown) return; // a list that somebody has open stays as it is
   shown = key;
@@ -83,7 +88,11 @@ function showElectrodes(s) {
   }
 }
 
+let told = "";
 function showState(s) {
+  const key = JSON.stringify(s);
+  if (key === told) return;
+  told = key;
   recording = !!s.recording; up = s.up === 2 ? 2 : 1;
   $("record").setAttribute("aria-pressed", recording); $("record").textContent = recording ? "Stop recording" : "Record";
   $("record").title = s.recording || "";

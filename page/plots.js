@@ -3,15 +3,39 @@
 "use strict";
 const $ = id => document.getElementById(id);
 const colours = ["#1f77b4", "#d62728", "#2ca02c", "#e07b00", "#7b4fb5", "#00838f", "#c2185b", "#6d7f1b"];
-const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const plots = new Map(), POINTS = 400; // of a line; more would not be seen
+const plots = new Map(), POINTS = 250; // of a line; more would not be seen
+
+// Colours of the page's look: asked for once, since asking makes the browser go through all styles.
+let looks = new Map();
+function css(name) {
+  if (!looks.has(name)) looks.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return looks.get(name);
+}
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  looks = new Map();
+  for (const p of plots.values()) if (p.u) p.u.destroy();
+  plots.clear(); redraw(true);
+});
+
+// What is on the screen; nothing else is drawn.
+const inSight = new Set(), sight = new IntersectionObserver(list => {
+  for (const e of list) if (e.isIntersecting) inSight.add(e.target.id); else inSight.delete(e.target.id);
+  redraw(true);
+});
 
 // A canvas in the pixels of the screen.
-function sheet(c) {
-  const k = window.devicePixelRatio || 1, w = c.clientWidth, h = c.clientHeight;
+function sheet(c, g = c.getContext("2d", { desynchronized: true })) {
+  const k = Math.min(2, window.devicePixelRatio || 1), w = c.clientWidth, h = c.clientHeight; // finer is not seen
   if (c.width !== Math.round(w * k) || c.height !== Math.round(h * k)) { c.width = Math.round(w * k); c.height = Math.round(h * k); }
-  const g = c.getContext("2d"); g.setTransform(k, 0, 0, k, 0, 0); g.clearRect(0, 0, w, h);
+  g.setTransform(k, 0, 0, k, 0, 0); g.clearRect(0, 0, w, h);
   return { g, w, h };
+}
+
+// What `make` makes draws on canvases that do not wait for the rest of the page; uPlot has no option for it.
+function pastLayout(make) {
+  const proper = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind) { return proper.call(this, kind, { desynchronized: true }); };
+  try { return make(); } finally { HTMLCanvasElement.prototype.getContext = proper; }
 }
 
 // What an axis spans: a tenth more than the lines, and `least` at least, so that small changes stay small.
@@ -42,7 +66,7 @@ function makePlot(box, lines, band, o = {}) {
     width: box.clientWidth || 300, height: height(), padding: [6, 8, 0, 0], legend: { show: o.legend !== false && lines.length > 1, live: false },
     cursor: { sync: { key: "time" }, drag: { x: true, y: false } }, scales: { x: { time: false }, y: { range } },
     axes: [{ ...axis, size: 28, values: (_, v) => v.map(t => t + " s") }, { ...axis, size: 48 }],
-    series: [{}, ...lines.map((l, i) => ({ label: l.name, stroke: l.colour || colours[i % colours.length], width: l.width === undefined ? 1.6 : l.width, dash: l.dash, points: { show: false } }))],
+    series: [{}, ...lines.map((l, i) => ({ label: l.name, stroke: l.colour || colours[i % colours.length], width: l.width === undefined ? (o.width || 1.6) : l.width, dash: l.dash, points: { show: false } }))],
     bands: o.sd ? [{ series: o.sd, fill: css("--band") }] : [],
     hooks: { drawClear: [shade] },
   }, [[0, 1], ...lines.map(() => [null, null])], box);
@@ -89,17 +113,25 @@ function drawStill(box, lines, o) {
   if (typeof uPlot === "undefined") plainPlot(box, lines, data, () => null, o); else makePlot(box, lines, () => null, o).setData(data);
 }
 
-// Draws `lines` [{name, key, colour, dash}] of the frames into the box `id`; `band` () => [low, high] or null.
-function drawPlot(id, frames, lines, value, band = () => null) {
-  const box = $(id), names = lines.map(l => l.name + l.key).join(), step = Math.ceil(frames.length / POINTS);
-  frames = frames.filter(f => f[0] % step === 0); // by the frame's number: the same ones each time
-  const data = [frames.map(f => f[1]), ...lines.map(l => frames.map(f => { const v = value(f, l.key); return Number.isFinite(v) ? v : null; }))];
-  if (typeof uPlot === "undefined") { plainPlot(box, lines, data, band); return; }
+// Draws `lines` [{ name, key, colour, dash }] of the last seconds into the box `id`; `band` () => [low, high] or null. The
+// arrays are kept from one time to the next.
+function drawPlot(id, lines, band = () => null) {
+  const names = lines.map(l => l.name + l.key).join();
   let p = plots.get(id);
   if (!p || p.names !== names) {
-    if (p) p.u.destroy();
-    p = { names, u: makePlot(box, lines, band) };
+    if (p && p.u) p.u.destroy();
+    p = { names, spots: lines.map(l => spot(l.key)), data: [[], ...lines.map(() => [])], u: typeof uPlot === "undefined" ? null : pastLayout(() => makePlot($(id), lines, band, { width: 1.2 })) };
     plots.set(id, p);
   }
-  p.u.setData(data);
+  const step = past.step * Math.ceil(past.n / POINTS);
+  let n = 0;
+  for (let i = 0; i < past.n; i++) {
+    const k = slot(i);
+    if (past.number[k] % step) continue; // by the frame's number: the same ones each time
+    p.data[0][n] = past.time[k];
+    p.spots.forEach((s, j) => { const v = s.at === UNSEEN ? NaN : s.factor * past.values[k * past.width + s.at]; p.data[j + 1][n] = isFinite(v) ? v : null; });
+    n++;
+  }
+  for (const d of p.data) d.length = n;
+  if (p.u) p.u.setData(p.data); else plainPlot($(id), lines, p.data, band);
 }

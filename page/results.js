@@ -17,7 +17,7 @@ function picture(p, group, times, pick) {
   caption.append(p.name, small); box.className = "plot low"; figure.append(caption, box);
   box.setAttribute("role", "img"); box.setAttribute("aria-label", `${group.heading}: ${p.name},${small.textContent}`);
   box.show = () => {
-    const looks = { true: { name: "true", colour: css("--soft"), width: 3 }, measured: { name: "measured", colour: css("--amber") }, estimated: { name: "estimated", colour: css("--blue") } };
+    const kinds = { true: { name: "true", colour: css("--soft"), width: 3 }, measured: { name: "measured", colour: css("--amber") }, estimated: { name: "estimated", colour: css("--blue") } };
     const lines = [], o = { least: group.least, legend: false, pick };
     const deviation = p.lines.find(l => l[0] === "sd"), estimate = p.lines.find(l => l[0] === "estimated");
     if (deviation) { // between the two lines that nobody sees
@@ -25,7 +25,7 @@ function picture(p, group, times, pick) {
       for (const sign of [1, -1]) lines.push({ name: "", colour: "transparent", width: 0, x, y: y.map((v, i) => v + sign * 1.96 * sd[i]) });
       o.sd = [1, 2];
     }
-    for (const [kind, time, values] of p.lines) if (looks[kind]) lines.push({ ...looks[kind], x: times[time], y: numbers(values) });
+    for (const [kind, time, values] of p.lines) if (kinds[kind]) lines.push({ ...kinds[kind], x: times[time], y: numbers(values) });
     drawStill(box, lines, o);
   };
   seenOnce.observe(box);
@@ -34,16 +34,20 @@ function picture(p, group, times, pick) {
 
 function open(r) {
   document.body.classList.add("recorded");
-  begin(r); up = r.up;
+  begin(r, r.time.length); up = r.up;
   const verdict = /^usable: (yes|doubtful|no)\n/.exec(r.summary); // not to be overlooked
   if (verdict) { $("verdict").textContent = verdict[0].trim(); $("verdict").className = "verdict " + verdict[1]; }
   $("verdict").hidden = !verdict;
   $("findings").textContent = verdict ? r.summary.slice(verdict[0].length) : r.summary;
   $("h-figure").closest("section").hidden = !labels("skeleton").length && !labels("markers").length;
-  const all = numbers(r.values), n = r.signals.reduce((k, s) => k + s.labels.length, 0);
-  history = r.time.map((t, k) => [k, t, r.status[k], 0, 0, 0, 0, 0, ...all.subarray(k * n, (k + 1) * n)]);
-  $("when").max = history.length - 1;
-  const show = () => { frame = history[+$("when").value]; $("moment").textContent = frame[1].toFixed(2) + " s"; dirty = true; lined = 0; };
+  const all = numbers(r.values), width = past.width;
+  past.values = all; past.n = r.time.length; past.time = Float64Array.from(r.time); past.number = past.time.map((_, i) => i);
+  $("when").max = past.n - 1;
+  const show = () => {
+    const k = +$("when").value;
+    now.head.set([k, r.time[k], r.status[k]]); now.values.set(all.subarray(k * width, (k + 1) * width)); anything = true;
+    $("moment").textContent = r.time[k].toFixed(2) + " s"; redraw(true);
+  };
   const pick = t => { let best = 0; r.time.forEach((v, i) => { if (Math.abs(v - t) < Math.abs(r.time[best] - t)) best = i; }); $("when").value = best; show(); };
   $("when").oninput = show; show();
   const kinds = new Set(r.groups.flatMap(g => g.panels.flatMap(p => p.lines.map(l => l[0]))));

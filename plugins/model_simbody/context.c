@@ -145,9 +145,6 @@ mhe_status simbody_create(const mhe_host *host, const mhe_description *descripti
     if (status == MHE_OK && c->paths == SIMBODY_PATHS_FITTED) {
         status = model_fit(model, c, err);
     }
-    if (status == MHE_OK && host != NULL && c->paths == SIMBODY_PATHS_EXACT) {
-        simbody_tell_jumping(host, description);
-    }
     if (status == MHE_OK && host != NULL && description->n_obstacles > 0) {
         status = simbody_tell_inside(model, err);
     }

@@ -60,9 +60,6 @@ typedef struct simbody_context {
  * model that is built, with a host. */
 mhe_status simbody_tell_inside(simbody_model *model, mhe_error *err);
 
-/* Tells how many paths have what lets lengths jump. */
-void simbody_tell_jumping(const mhe_host *host, const mhe_description *description);
-
 /* bodies.c: poses of the bodies and their derivatives, as mhe_kinematics has them; either may be
  * NULL. Of a context that is placed. */
 void bodies_place(const simbody_context *c, double *body, double *body_q);

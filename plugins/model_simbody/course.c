@@ -307,92 +307,28 @@ static void points_insert(const path_route *route, const path_pose *pose, const 
     }
 }
 
-/* The wrap is not tried again. */
-static void order_bar(route_work *work, int32_t w) {
-    int32_t n = 0;
-    for (int32_t k = 0; k < work->n_order; k++) {
-        if (work->order[k] != w) {
-            work->order[n++] = work->order[k];
-        }
-    }
-    work->n_order = n;
-}
-
-/* Whether no string of a row ends inside the next one's obstacle. */
-static int course_is_clear(const path_route *route, const route_work *work) {
-    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
-        int32_t u = work->pieces[i].wrap, w = work->pieces[i + 1].wrap;
-        if (work->pieces[i].joint[1] < 0 || work->pieces[i + 1].joint[0] < 0) {
-            continue;
-        }
-        if ((work->state[u] > 0 && string_off(route, w, work, work->strings[u].b) < 0) ||
-            (work->state[w] > 0 && string_off(route, u, work, work->strings[w].a) < 0)) {
-            return 0;
-        }
-    }
-    return 1;
-}
-
-/* A wrap that is on the course but without a string, or was in the way of one without being on it;
- * -1: none. The last in the order goes first. */
-static int32_t order_idle(const route_work *work) {
-    for (int32_t k = work->n_order - 1; k >= 0; k--) {
-        int32_t u = work->order[k];
-        if (work->state[u] > 0) {
-            continue;
-        }
-        for (int32_t i = 0; i < work->n_stops; i++) {
-            if (work->stops[i].wrap == u) {
-                return u;
-            }
-        }
-        for (int32_t m = 0; m < work->n_order; m++) {
-            int32_t w = work->order[m];
-            if (work->state[w] == WRAP_INSIDE && work->blocker[w] == u) {
-                return u;
-            }
-        }
-    }
-    return -1;
-}
-
-/* The course without what holds no string. 0: each string of a row is clear of the others. */
-static int course_try(const path_route *route, const path_pose *pose, const double *numbers,
-                      int pushes, route_work *work) {
-    int32_t idle = -1;
-    work->pushes = pushes;
-    work->pushed = 0;
-    work->n_order = route->n_wraps;
+void course_lay(const path_route *route, const path_pose *pose, const double *numbers,
+                route_work *work) {
     for (int32_t w = 0; w < route->n_wraps; w++) {
-        work->order[w] = w;
+        work->state[w] = WRAP_NONE;
+        work->blocker[w] = -1;
     }
-    do {
-        for (int32_t w = 0; w < route->n_wraps; w++) {
-            work->state[w] = WRAP_NONE;
-            work->blocker[w] = -1;
-        }
-        points_insert(route, pose, numbers, work);
-        wraps_insert(route, work);
-        pieces_make(route, work);
-        if (route->n_wraps > 1) {
-            strings_renew(route, work);
-        }
-        idle = work->n_joints > 0 ? joints_tighten(route, work) : -1;
-        idle = idle < 0 ? order_idle(work) : idle;
-        if (idle >= 0) {
-            order_bar(work, idle);
-        }
-    } while (idle >= 0);
-    return course_is_clear(route, work) ? 0 : -1;
+    points_insert(route, pose, numbers, work);
+    wraps_insert(route, work);
+    pieces_make(route, work);
+    if (route->n_wraps > 1) {
+        strings_renew(route, work);
+    }
 }
 
-void course_find(const path_route *route, const path_pose *pose, const double *numbers,
-                 route_work *work) {
+int course_touches(const path_route *route, int32_t w, route_work *work) {
+    (void)wrap_insert(route, w, work);
+    return work->state[w] > 0;
+}
+
+void course_obstacles(const path_route *route, const path_pose *pose, route_work *work) {
     for (int32_t w = 0; w < route->n_wraps; w++) {
         place_obstacle(&route->wraps[w], pose, work->obstacles + 12 * w);
         work->hopeless[6 * w] = NAN;
-    }
-    if (course_try(route, pose, numbers, route->n_wraps > 1, work) != 0 && work->pushed) {
-        (void)course_try(route, pose, numbers, 0, work);
     }
 }

@@ -16,7 +16,7 @@
 #define MAGIC 0x32746966656d6800u /* "mhefit2", backwards */
 #define MOST 4096                 /* of any count in a file */
 /* to be raised with every change of lengths or fits: older files are not read */
-#define LENGTHS 5
+#define LENGTHS 6
 
 /* ---- digest ---- */
 

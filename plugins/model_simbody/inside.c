@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* inside.c: tells of paths that end inside what they are to wrap around, and of those that jump. */
+/* inside.c: tells of paths that end inside what they are to wrap around. */
 #include "context.h"
 
 #include <mhe/host.h>
@@ -19,26 +19,6 @@ static void tell_route(const mhe_host *host, const mhe_description *d, const pat
                            path->name, (int)path->line, d->obstacles[path->wraps[w].obstacle].name);
             host->log(host, MHE_LOG_WARNING, text);
         }
-    }
-}
-
-void simbody_tell_jumping(const mhe_host *host, const mhe_description *d) {
-    int32_t conditional = 0, several = 0;
-    for (int32_t i = 0; i < d->n_paths; i++) {
-        int32_t points = 0;
-        for (int32_t k = 0; k < d->paths[i].n_points; k++) {
-            points += d->paths[i].points[k].kind == MHE_POINT_CONDITIONAL;
-        }
-        conditional += points > 0;
-        several += d->paths[i].n_wraps > 1;
-    }
-    if (conditional + several > 0) {
-        char text[256];
-        (void)snprintf(text, sizeof text,
-                       "%d paths have conditional points and %d pass several obstacles: their "
-                       "lengths may jump there ('mhe-model sweep' says where)",
-                       (int)conditional, (int)several);
-        host->log(host, MHE_LOG_INFO, text);
     }
 }
 

@@ -25,6 +25,7 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
     if (before != NULL) {
         into_frame(frame, before->a, guess.a);
         guess.arc = before->arc;
+        guess.held = before->held;
     }
     int state =
         wrap_solve(&route->wraps[w].surface, ends[0], ends[1], before != NULL ? &guess : NULL, out);

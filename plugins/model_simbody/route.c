@@ -251,6 +251,7 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->newton, sizeof(double) * 2 * n_w * (2 * n_w + 1)},
                  {&out->gradient, sizeof(double) * n},
                  {&out->hessian, sizeof(double) * n * n},
+                 {&out->kept, sizeof(double) * 4 * n * (n + 1)},
                  {&out->polynomial, sizeof(double) * n_f * (3 * POLYNOMIAL_POWERS + 1 + n_f)},
                  {&out->factors, sizeof(double *) * n_f},
                  {&out->shared, sizeof(shared_factors) * (size_t)set->n_numbers},
@@ -262,7 +263,8 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->pieces, sizeof(course_piece) * n_s},
                  {&out->state, sizeof(int32_t) * n_w},
                  {&out->blocker, sizeof(int32_t) * n_w},
-                 {&out->order, sizeof(int32_t) * n_w}};
+                 {&out->order, sizeof(int32_t) * n_w},
+                 {&out->without, n_w}};
     size_t total = 64, n_parts = sizeof parts / sizeof parts[0];
     for (size_t i = 0; i < n_parts; i++) {
         parts[i].bytes = (parts[i].bytes + 15) / 16 * 16;
@@ -307,9 +309,8 @@ void routes_lengths(const tree *t, const route_set *set, const path_pose *pose,
         if (route->length != NULL) {
             value = polynomial_length(route, numbers, work, gradient, hessian);
         } else {
-            course_find(route, pose, numbers, work);
-            value = strand_length(t, route, pose, work, &stride, gradient,
-                                  length_qq != NULL ? hessian : NULL);
+            value = route_length(t, route, pose, numbers, work, &stride, gradient,
+                                 length_qq != NULL ? hessian : NULL);
         }
         size_t row = (size_t)route->path;
         if (length != NULL) {

@@ -93,7 +93,9 @@ typedef struct route_work {
     double *hopeless;     /* [n_wraps x 6]: ends between which none was found, NaN: none yet */
     int32_t *order;       /* [n_wraps]: those that may be on, in the order tried */
     int32_t n_order;
+    uint8_t *without;       /* [n_wraps]: 1: that one is left out */
     int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */
+    int32_t lost;           /* the last wrap that held no string in a row; -1: none */
     int32_t pushes, pushed; /* see wrap_try(): whether it may, whether it did */
     course_joint *joints;   /* [n_wraps] */
     course_piece *pieces;   /* [n_points + 2 n_wraps] */
@@ -101,6 +103,7 @@ typedef struct route_work {
     double *newton; /* [(2 n_wraps) x (2 n_wraps + 1)] */
     strand_step *steps[2];
     double *gradient, *hessian; /* of a route, with the joints' freedoms */
+    double *kept;               /* [4 x (n_own + n_own^2)]: of courses; see rivals.c */
     double *polynomial;         /* scratch */
     const double **factors;     /* [n_factors] */
     shared_factors *shared;     /* [n_numbers] */
@@ -143,9 +146,29 @@ int32_t route_points(const path_route *route, const path_pose *pose, const doubl
 
 /* ---- between the files of this part ---- */
 
-/* Places the points and finds the course: work->stops, strings, joints. */
+/* Places the obstacles and the points and finds the course: work->stops, strings, joints. */
 void course_find(const path_route *route, const path_pose *pose, const double *numbers,
                  route_work *work);
+/* Again, without those of work->without. */
+void course_without(const path_route *route, const path_pose *pose, const double *numbers,
+                    route_work *work);
+
+/* The obstacles in ground. */
+void course_obstacles(const path_route *route, const path_pose *pose, route_work *work);
+
+/* The course of the points that are on and of the wraps of work->order, not tightened. */
+void course_lay(const path_route *route, const path_pose *pose, const double *numbers,
+                route_work *work);
+
+/* Whether wrap w, that is not on the course, would be if it were tried (which leaves the course
+ * of no use). */
+int course_touches(const path_route *route, int32_t w, route_work *work);
+
+/* Length of a route that is no polynomial, with gradient and hessian (NULL: not wanted; rows of
+ * *stride) by the own coordinates. */
+double route_length(const tree *tree, const path_route *route, const path_pose *pose,
+                    const double *numbers, route_work *work, int32_t *stride, double *gradient,
+                    double *hessian);
 
 /* Ends of a piece in ground. */
 void piece_ends(const route_work *work, const course_piece *piece, const double *ends[2]);

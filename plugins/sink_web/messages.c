@@ -3,16 +3,22 @@
  *
  * To the page: a text {"run": ...} once, texts {"state": ...} twice a second, answers {"done": ...}
  * or {"error": ...}; and frames, binary, little-endian: WEB_HEAD float64 (number, time, status,
- * iterations, solve time, latency, lost, spare), then float32 for all signals in the order of the
- * description, NaN where there is none. From the page: texts {"do": "record-start", "text": ...,
- * "token": ...}. */
+ * iterations, solve time, latency, lost, latency when it was sent), then float32 for all signals in
+ * the order of the description, NaN where there is none. From the page: texts {"do":
+ * "record-start", "text": ..., "token": ...}. */
 #include "web.h"
 
+#include <math.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/socket.h>
 
-#define STATE_EVERY 0.5 /* s */
+#define STATE_EVERY 0.5  /* s */
+#define PACE_MOST 1.0    /* s */
+#define PACE_EARLY 0.002 /* s by which a frame may come before its time */
 
 int web_describe(web *w) {
     web_text t = {0};
@@ -66,6 +72,11 @@ void web_command(web *w, web_client *c, const char *json) {
         answer(c, "error", "a message needs the key 'do'");
         return;
     }
+    if (strcmp(name, "pace") == 0) { /* of its own frames: anybody may */
+        c->pace = fmin(fmax(strtod(text, NULL), 0), PACE_MOST);
+        answer(c, "done", name);
+        return;
+    }
     if (!w->config.open && !same_token(token, w->token)) {
         answer(c, "error", "not allowed: open the page by the address that mhe-live printed");
         return;
@@ -81,7 +92,7 @@ void web_command(web *w, web_client *c, const char *json) {
         }
     }
     answer(c, "error",
-           "'do' is none of stop, record-start, record-stop, mvc-start, mvc-stop, label");
+           "'do' is none of stop, record-start, record-stop, mvc-start, mvc-stop, label, pace");
 }
 
 static int send_text(web *w, web_client *c, const char *text, size_t n) {
@@ -109,12 +120,35 @@ static int send_frame(web *w, web_client *c) {
     double head[WEB_HEAD];
     memcpy(head, frame, sizeof head);
     head[6] += (double)c->lost;
+    head[7] = web_now() - head[7];
     memcpy(out, head, sizeof head);
     for (int32_t i = 0; i < w->n_values; i++) {
         const float value = (float)frame[WEB_HEAD + i];
         memcpy(out + sizeof head + sizeof value * (size_t)i, &value, sizeof value);
     }
     return web_write(w, c, sizeof head + sizeof(float) * (size_t)w->n_values, 0);
+}
+
+int web_is_due(const web *w, const web_client *c) {
+    return c->next < w->n_frames && (c->next < c->until || w->n_frames - c->next > WEB_FRAMES / 4 ||
+                                     web_now() - c->served > c->pace - PACE_EARLY);
+}
+
+static void hold_back(const web_client *c, int on) {
+    (void)setsockopt(lws_get_socket_fd(c->wsi), IPPROTO_TCP, TCP_CORK, &on, sizeof on);
+}
+
+/* All frames that are there, in one go: a browser wakes once for them. */
+static int send_frames(web *w, web_client *c, double now) {
+    int result = 0;
+    c->served = c->next < c->until ? c->served : now;
+    c->until = w->n_frames;
+    hold_back(c, 1);
+    do {
+        result = send_frame(w, c);
+    } while (result == 0 && c->next < w->n_frames && !lws_send_pipe_choked(c->wsi));
+    hold_back(c, 0);
+    return result;
 }
 
 int web_send_page(web *w, web_client *c) {
@@ -130,5 +164,5 @@ int web_send_page(web *w, web_client *c) {
         c->told_state = now;
         return send_state(w, c);
     }
-    return c->next < w->n_frames ? send_frame(w, c) : 0;
+    return web_is_due(w, c) ? send_frames(w, c, now) : 0;
 }

@@ -103,7 +103,7 @@ static void catch_up(const web *w, web_client *c) {
 static int write_next(web *w, web_client *c) {
     catch_up(w, c);
     const int result = (c->foxglove ? web_send_foxglove : web_send_page)(w, c);
-    if (c->next < w->n_frames || c->answer != NULL || !c->told_run) {
+    if (web_is_due(w, c) || c->answer != NULL || !c->told_run) {
         lws_callback_on_writable(c->wsi);
     }
     return result;
@@ -301,9 +301,9 @@ static mhe_status web_take(void *self, const mhe_sink_sample *s, mhe_error *err)
     }
     w->last = s->time;
     double *frame = web_frame_at(w, w->n_frames);
-    const double head[WEB_HEAD] = {
-        (double)s->number,    s->time,         s->status, s->iterations, s->solve_time,
-        web_now() - s->stamp, (double)s->lost, 0};
+    const double head[WEB_HEAD] = {(double)s->number, s->time,       s->status,
+                                   s->iterations,     s->solve_time, web_now() - s->stamp,
+                                   (double)s->lost,   s->stamp};
     memcpy(frame, head, sizeof head);
     double *at = frame + WEB_HEAD;
     for (int32_t i = 0; i < w->run->n_signals; i++) {
@@ -313,7 +313,9 @@ static mhe_status web_take(void *self, const mhe_sink_sample *s, mhe_error *err)
     }
     w->n_frames++;
     for (int32_t i = 0; i < w->n_clients; i++) {
-        lws_callback_on_writable(w->clients[i]->wsi);
+        if (web_is_due(w, w->clients[i])) {
+            lws_callback_on_writable(w->clients[i]->wsi);
+        }
     }
     return MHE_OK;
 }
@@ -327,7 +329,7 @@ static mhe_status web_poll(void *self, double seconds, mhe_error *err) {
     web *w = self;
     const double now = web_now();
     for (int32_t i = 0; i < w->n_clients; i++) { /* their state is due without any frame, too */
-        if (now - w->clients[i]->told_state > 1) {
+        if (now - w->clients[i]->told_state > 1 || web_is_due(w, w->clients[i])) {
             lws_callback_on_writable(w->clients[i]->wsi);
         }
     }

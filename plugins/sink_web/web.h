@@ -44,6 +44,9 @@ typedef struct web_client {
     int32_t place;     /* foxglove: subscription to serve next of the frame `next` */
     char *answer;      /* text to be sent first; NULL: none */
     double told_state; /* s, when the state was sent last */
+    double pace;       /* s between two times at which it gets frames: all that came by then */
+    double served;     /* s, when it got frames last */
+    int64_t until;     /* frame before which it is being sent all that is there */
     char command[WEB_COMMAND];
     size_t n_command;
     int32_t n_subscriptions;
@@ -90,6 +93,8 @@ int web_json_find(const char *json, const char *key, char *out, size_t room);
 int web_describe(web *w);                                  /* w->description; 0: no memory */
 void web_command(web *w, web_client *c, const char *json); /* from a page */
 int web_send_page(web *w, web_client *c); /* what is next for a page; -1: close it */
+
+int web_is_due(const web *w, const web_client *c); /* there are frames, and it is their time */
 
 /* foxglove.c: foxglove.websocket.v1 */
 void web_foxglove_welcome(web *w, web_client *c);

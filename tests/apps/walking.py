@@ -110,12 +110,42 @@ def demo(runs):
         hip = [reactions["hip_r_on_femur_r_in_femur_r_f" + axis] for axis in "xyz"]
         knee = max(math.sqrt(x * x + y * y + z * z) for x, y, z in zip(*hip))
         runs.expect("%s: the hip carries %.0f N, which is far from a walk's" % (setting, knee), abs(math.log(knee / 2000)), 0.7)
+    wrong_loads(runs)
     out, summary = runs.estimate("consistent", [  # the costs that the motion itself was made with
         "costs.0.sigma=0.0005", "costs.2.sigma=2", "costs.3.sigma=2", "costs.4.sigma=30"])
     forces = table(os.path.join(out, "forces.sto"))
     worst = max(rms([f - at(t, truth["time"], truth["F_" + name]) for t, f in zip(forces["time"], forces[name])][5:-3]) /
                 max(truth["F_" + name]) for name in forces if name != "time")
     runs.expect("with the motion's own costs: the worst muscle's force, of its peak", worst, 0.02)
+
+
+def wrong_loads(runs):
+    """What a base that floats is given beyond the loads is told, and named."""
+    folder = os.path.join(runs.source, "models", "gait10dof")
+    with open(os.path.join(folder, "demo_walk_loads.xml")) as file:
+        description = file.read()
+    with open(os.path.join(folder, "demo_walk_loads.sto")) as file:
+        head, body = file.read().split("endheader\n")
+    names, *rows = [line.split("\t") for line in body.split("\n") if line.strip()]
+    cases = {  # which columns, factor, offset; what the verdict says
+        "as_it_is": ("none", 1, 0, None),
+        "no_left_foot": ("foot_l_v", 0, 0, "the residual force at pelvis_ty is"),
+        "points_50_mm_ahead": ("px", 1, 0.05, "the residual moment at pelvis_tilt is"),
+        "nine_tenths": ("_v", 0.9, 0, "the residual force at pelvis_ty is"),
+        "shear_turned": ("vx", -1, 0, "the residual moment at pelvis_tilt is")}
+    for name, (columns, factor, offset, said) in cases.items():
+        which = [k for k, column in enumerate(names) if columns in column]
+        path = os.path.join(runs.work, name)
+        with open(path + ".sto", "w") as file:
+            file.write(head + "endheader\n" + "\t".join(names) + "\n" + "".join("\t".join(
+                repr(factor * float(x) + offset) if k in which else x for k, x in enumerate(row)) + "\n" for row in rows))
+        with open(path + ".xml", "w") as file:
+            file.write(description.replace("demo_walk_loads.sto", name + ".sto"))
+        findings = runs.estimate("follow", ["data.external_loads=%s.xml" % path])[1]["verdict"]["findings"]
+        told = [f["what"] for f in findings if f["weight"] != "note" and f["what"].startswith("the residual")]
+        right = not told if said is None else any(what.startswith(said) for what in told)
+        print("loads, %s: %s" % (name, "; ".join(told) or "nothing is said of them"))
+        runs.good &= right
 
 
 def inertial(runs, model, ik):

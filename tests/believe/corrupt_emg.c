@@ -55,6 +55,18 @@ static double largest(recording *r) {
 static void emg_baseline(recording *r) {
     gain(r, 1, 0.3 * largest(r));
 }
+static void emg_offset(recording *r) {
+    gain(r, 1, 0.1 * largest(r));
+}
+static void emg_hum(recording *r) { /* 50 Hz, or what is left of it in an envelope */
+    const double size = 0.2 * largest(r);
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        const double hum = r->emg->rate > 200 ? sin(100 * acos(-1) * r->emg->time[k]) : 0.5;
+        for (int32_t i = 0; i < r->emg->n_columns; i++) {
+            *corrupt_cell(r->emg, k, i) += size * hum;
+        }
+    }
+}
 static void emg_inverted(recording *r) {
     gain(r, -1, largest(r));
 }
@@ -96,6 +108,33 @@ static void emg_as_raw(recording *r) { /* an alternating signal of that size */
         r->emg->values[i] *= 1.5 * corrupt_normal(r);
     }
 }
+static void emg_rectified(recording *r) {
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->emg->n_rows * r->emg->n_columns; i++) {
+        r->emg->values[i] = fabs(r->emg->values[i]);
+    }
+}
+static void emg_artefact(recording *r) { /* a cable moves: slow and large, in all channels */
+    const double size = 2 * largest(r);
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        const double swing = size * sin(2 * acos(-1) * r->emg->time[k]);
+        for (int32_t i = 0; i < r->emg->n_columns; i++) {
+            *corrupt_cell(r->emg, k, i) += r->emg->rate > 200 ? swing : fmax(0, 0.1 * swing);
+        }
+    }
+}
+static void emg_spikes(recording *r) {
+    const double size = 5 * largest(r);
+    for (ptrdiff_t i = 0; i < (ptrdiff_t)r->emg->n_rows * r->emg->n_columns; i++) {
+        r->emg->values[i] += corrupt_uniform(r) < 0.002 ? size : 0;
+    }
+}
+static void emg_drift(recording *r) { /* an electrode dries: gains fall to a third */
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        for (int32_t i = 0; i < r->emg->n_columns; i++) {
+            *corrupt_cell(r->emg, k, i) *= 1 - 0.67 * k / r->emg->n_rows;
+        }
+    }
+}
 static void emg_frozen(recording *r) {
     for (int32_t k = r->emg->n_rows / 4 + 1; k < r->emg->n_rows; k++) {
         memcpy(corrupt_cell(r->emg, k, 0), corrupt_cell(r->emg, r->emg->n_rows / 4, 0),
@@ -108,6 +147,11 @@ static void emg_part(recording *r) {
 static void emg_late(recording *r) {
     for (int32_t k = 0; k < r->emg->n_rows; k++) {
         r->emg->time[k] += 0.3;
+    }
+}
+static void emg_later(recording *r) {
+    for (int32_t k = 0; k < r->emg->n_rows; k++) {
+        r->emg->time[k] += 0.15;
     }
 }
 static void emg_early(recording *r) {
@@ -154,15 +198,22 @@ const corruption corrupt_emg[] = {
     {"emg_negative", "EMG: wrong sign", emg_negative},
     {"emg_inverted", "EMG: upside down", emg_inverted},
     {"emg_baseline", "EMG: an offset of 30 % of its peak", emg_baseline},
+    {"emg_offset", "EMG: an offset of 10 % of its peak", emg_offset},
+    {"emg_hum", "EMG: mains hum in all channels", emg_hum},
     {"emg_own_peak", "EMG: scaled to each channel's peak", emg_own_peak},
     {"emg_zero", "EMG: all zeros", emg_zero},
     {"emg_dead", "EMG: the strongest channel zero", emg_dead},
     {"emg_rotate", "EMG: every label on the next channel", emg_rotate},
     {"emg_swap", "EMG: the two strongest exchanged", emg_swap},
     {"emg_as_raw", "EMG: alternating (raw as normalised)", emg_as_raw},
+    {"emg_rectified", "EMG: rectified before", emg_rectified},
+    {"emg_artefact", "EMG: a slow swing in all channels", emg_artefact},
+    {"emg_spikes", "EMG: spikes of five times its peak", emg_spikes},
+    {"emg_drift", "EMG: gains fall to a third", emg_drift},
     {"emg_frozen", "EMG: repeats one sample for 75 %", emg_frozen},
     {"emg_part", "EMG: half of the trial", emg_part},
     {"emg_late", "EMG: 0.3 s late", emg_late},
+    {"emg_later", "EMG: 0.15 s late", emg_later},
     {"emg_early", "EMG: 0.3 s early", emg_early},
     {"emg_clock", "EMG: clock 25 % slow", emg_clock},
     {"emg_clipped", "EMG: cut off at 15 % of its peak", emg_clipped},

@@ -82,6 +82,22 @@ static void scale(recording *r, double s) {
     const double m[9] = {s, 0, 0, 0, s, 0, 0, 0, s};
     move(r, m, 0, 0, 0);
 }
+static void drift_60(recording *r) {
+    mhi_table *t = r->markers;
+    for (int32_t k = 0; k < t->n_rows; k++) {
+        for (int32_t i = 0; i < t->n_columns; i += 3) {
+            *corrupt_cell(t, k, i) += 0.06 * k / t->n_rows;
+        }
+    }
+}
+static void moved_40(recording *r) { /* someone bumps into a camera */
+    mhi_table *t = r->markers;
+    for (int32_t k = t->n_rows / 2; k < t->n_rows; k++) {
+        for (int32_t i = 1; i < t->n_columns; i += 3) {
+            *corrupt_cell(t, k, i) += 0.04;
+        }
+    }
+}
 static void scale_110(recording *r) {
     scale(r, 1.1);
 }
@@ -221,6 +237,8 @@ const corruption corrupt_markers[] = {
     {"shift_300", "markers: origin 0.39 m beside", shift_300},
     {"shift_50", "markers: origin 50 mm beside", shift_50},
     {"shift_20", "markers: origin 20 mm beside", shift_20},
+    {"drift_60", "markers: origin drifts by 60 mm", drift_60},
+    {"moved_40", "markers: origin 40 mm beside from the middle on", moved_40},
     {"scale_110", "markers: 10 % too large", scale_110},
     {"scale_90", "markers: 10 % too small", scale_90},
     {"scale_inch", "markers: inches called mm", scale_inch},

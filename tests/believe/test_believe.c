@@ -12,15 +12,20 @@
 
 #define FRAMES 200
 #define MUSCLES 4
-#define MARKERS 2
+#define MARKERS 3
 
 static const mhe_coordinate coordinates[] = {
     {.name = "flex", .rotational = 1, .lower = -0.2, .upper = 2.6},
     {.name = "slide", .rotational = 0, .lower = -1, .upper = 1}};
 static const mhe_muscle muscles[] = {{.name = "A"}, {.name = "B"}, {.name = "C"}, {.name = "D"}};
-static const mhe_marker markers[] = {{.name = "K"}, {.name = "L"}};
+static const mhe_motion hinge = {.kind = MHE_MOTION_ROTATION, .coordinate = 0, .axis = {0, 0, 1}};
+static const mhe_body bodies[] = {
+    {.name = "fore", .parent = -1, .n_motions = 1, .motions = &hinge}};
+static const mhe_marker markers[] = {{.name = "K"}, {.name = "L"}, {.name = "BASE", .body = -1}};
 
 static const mhe_description model = {.size = sizeof model,
+                                      .n_bodies = 1,
+                                      .bodies = bodies,
                                       .n_coordinates = 2,
                                       .coordinates = coordinates,
                                       .n_muscles = MUSCLES,
@@ -154,6 +159,30 @@ static void doubtful_emg_is_named(void **state) {
     free_rig(r);
 }
 
+static void muscles_rest_at_times(void **state) {
+    (void)state;
+    rig *r = new_rig();
+    for (int k = 0; k < FRAMES * MUSCLES; k++) {
+        r->emg[k] += r->emg[k] == 0 ? 0.01 : 0; /* rest, written with two decimals */
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    assert_int_equal(r->findings.n, 0);
+    for (int k = 0; k < FRAMES * MUSCLES; k++) {
+        r->emg[k] += k % MUSCLES > 0 ? 0.03 : 0; /* one still rests */
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+    r = new_rig();
+    for (int k = 0; k < FRAMES * MUSCLES; k++) {
+        r->emg[k] += 0.03 + 1e-4 * (k % 7); /* hum */
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "none of 4 muscles is ever at rest");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+}
+
 static void a_cost_without_its_emg_is_told(void **state) {
     (void)state;
     static const mhe_plugin cost = {.id = "mhe.cost.emg-markers-high"};
@@ -190,6 +219,31 @@ static void angles_against_their_ranges(void **state) {
     }
     assert_int_equal(check_angles(r, 0), MHE_OK);
     expect(r, MHI_FINDING_DOUBTFUL, "'flex' goes from -0.8 to -0.2");
+    free_rig(r);
+}
+
+static void markers_that_jump_together(void **state) {
+    (void)state;
+    const int width = 3 * MARKERS;
+    rig *r = new_rig();
+    for (int k = 120 * width; k < FRAMES * width; k++) {
+        r->markers[k] += k % 3 == 1 ? 0.04 : 0; /* someone bumps into a camera */
+    }
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    expect(r, MHI_FINDING_DOUBTFUL, "most markers jump by 40 mm from 1.19 to 1.2 s");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+    r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->time[k] += k >= 120 ? 0.5 : 0; /* a gap in which they moved */
+        for (int i = 0; i < width; i++) {
+            r->markers[k * width + i] += k >= 120 ? 0.04 : 0;
+        }
+        /* carried by the ground: it rests */
+        memcpy(&r->markers[k * width + 6], &r->markers[6], 3 * sizeof(double));
+    }
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    assert_int_equal(r->findings.n, 0);
     free_rig(r);
 }
 
@@ -339,7 +393,7 @@ static void loads_against_gravity_weight_and_markers(void **state) {
         {z_up, MHI_FINDING_USELESS, "the loads push along (0.0"},
         {on_the_plate, MHI_FINDING_USELESS, "pull the body down"},
         {kilonewtons, MHI_FINDING_DOUBTFUL, "the model weighs 785 N"},
-        {far_away, MHI_FINDING_DOUBTFUL, "'foot1' acts up to 2.5"},
+        {far_away, MHI_FINDING_DOUBTFUL, "'foot1' acts up to 2.26"},
         {drifting, MHI_FINDING_DOUBTFUL, "'foot0' shows"},
         {runs_away, MHI_FINDING_DOUBTFUL, "'foot1' acts 33"},
     };
@@ -381,9 +435,11 @@ int main(void) {
         cmocka_unit_test(sound_data_give_no_finding),
         cmocka_unit_test(emg_that_is_none_is_refused),
         cmocka_unit_test(doubtful_emg_is_named),
+        cmocka_unit_test(muscles_rest_at_times),
         cmocka_unit_test(a_cost_without_its_emg_is_told),
         cmocka_unit_test(angles_against_their_ranges),
         cmocka_unit_test(markers_that_hold_or_are_gone),
+        cmocka_unit_test(markers_that_jump_together),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -27,6 +27,10 @@ static int setup(void **state) {
     write_file(FOLDER "angles.sto",
                "angles\nversion=1\nnRows=2\nnColumns=2\ninDegrees=no\nendheader\n"
                "time\tArm_RotY\n0\t0.25\n0.1\t-0.5\n");
+    write_file(FOLDER "radians.mot", "motion\nversion=1\nnRows=2\nnColumns=5\ninDegrees=yes\n"
+                                     "endheader\ntime\tArm_RotY\tArm_RotX\tArm_RotZ\t"
+                                     "q_LowerArm1_RotZ\n0\t0.1\t-0.5\t0\t1.5\n"
+                                     "0.1\t0.2\t-1.1\t0\t2.2\n");
     write_file(FOLDER "other.mot", "other\nversion=1\nnRows=1\nnColumns=2\ninDegrees=no\n"
                                    "endheader\ntime\tknee\n0\t1\n");
     return 0;
@@ -77,6 +81,10 @@ static void mistakes_are_named(void **state) {
                      MHE_E_INPUT);
     assert_non_null(strstr(f.err.text, "other.mot:8: model.motion: no column is a coordinate of "
                                        "the model ('Arm_RotY', ...)"));
+    test_fixture_close(&f);
+    assert_int_equal(test_fixture_open(&f, HEAD "  motion: " FOLDER "radians.mot\n" COSTS), MHE_OK);
+    assert_non_null(strstr(f.told, "radians.mot:8: model.motion: no angle is larger than 2.2 "
+                                   "degrees: if they are radians, write 'inDegrees=no'"));
     test_fixture_close(&f);
     assert_int_equal(test_fixture_open(&f, HEAD "  motion: " FOLDER "absent.mot\n" COSTS),
                      MHE_E_INPUT);

@@ -17,10 +17,7 @@
 static const struct {
     const char *model, *path;
     int jumps;
-} known[] = {{"MOBL_ARMS_41", "TMIN", 2},
-             {"MOBL_ARMS_41", "TRIlong", 1},
-             {"MOBL_ARMS_41", "CORB", 1},
-             {"ThoracoscapularShoulderModel", "TeresMajor", 3}};
+} known[] = {{"ThoracoscapularShoulderModel", "TeresMajor", 1}};
 #define N_KNOWN (sizeof known / sizeof known[0])
 
 static void sweep_model(const char *name, int *conditional, int *others) {

@@ -297,11 +297,45 @@ static void muscles_of_opensim_4_5(void **state) {
     mhi_description_free(d);
 }
 
+/* What a file leaves out, and OpenSim takes as 0, is told with its place. */
+static void what_is_left_out_is_told(void **state) {
+    (void)state;
+    mhe_description *d = parse(DOCUMENT(
+        "40500",
+        SET("BodySet", "<Body name=\"b\"><inertia>1 1 1 0 0 0</inertia></Body>\n")
+            SET("JointSet", "<PinJoint name=\"j\">" SOCKETS("ground", "b") "</PinJoint>\n")
+                SET("MarkerSet", "<Marker name=\"knee\"><socket_parent_frame>/bodyset/b"
+                                 "</socket_parent_frame></Marker>\n")
+                    SET("ForceSet",
+                        "<PathSpring name=\"s\"><resting_length>1</resting_length>"
+                        "<stiffness>1</stiffness><GeometryPath><PathPointSet><objects>"
+                        "<PathPoint name=\"p\"><socket_parent_frame>/bodyset/b"
+                        "</socket_parent_frame></PathPoint>" POINT(
+                            "/ground",
+                            "0 1 0") "</objects></PathPointSet></GeometryPath></PathSpring>\n")));
+    static const char *const told[] = {
+        "body 'b' has no mass: as in OpenSim it is 0",
+        "Marker 'knee' has no location: as in OpenSim it lies at 0 0 0 of its frame",
+        "PathPoint 'p' has no location"};
+    for (size_t k = 0; k < sizeof told / sizeof *told; k++) {
+        int32_t found = 0;
+        for (int32_t i = 0; i < d->n_warnings; i++) {
+            found += strstr(d->warnings[i], told[k]) != NULL &&
+                     strncmp(d->warnings[i], "m.osim:", 7) == 0;
+        }
+        if (found != 1) {
+            fail_msg("'%s' is told %d times", told[k], (int)found);
+        }
+    }
+    assert_int_equal(d->n_markers, 1);
+    mhi_description_free(d);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(layout_of_opensim_4),   cmocka_unit_test(layout_of_opensim_3),
-        cmocka_unit_test(spline_values),         cmocka_unit_test(other_functions),
-        cmocka_unit_test(joints_of_fixed_kind),  cmocka_unit_test(bodies_come_after_their_parents),
-        cmocka_unit_test(muscles_of_opensim_4_5)};
+        cmocka_unit_test(layout_of_opensim_4),    cmocka_unit_test(layout_of_opensim_3),
+        cmocka_unit_test(spline_values),          cmocka_unit_test(other_functions),
+        cmocka_unit_test(joints_of_fixed_kind),   cmocka_unit_test(bodies_come_after_their_parents),
+        cmocka_unit_test(muscles_of_opensim_4_5), cmocka_unit_test(what_is_left_out_is_told)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Everything a solver is given against central differences, on the 19-muscle arm with the real
  * plugins: accelerations, shooting intervals, cost gradients; both formulations, with and without
- * residual torques. */
+ * residual torques; what joints pass on among them. */
 #include "fixture.h"
 #include "support.h"
 
@@ -37,6 +37,21 @@ static const char *const problems[] = {
     "data: {marker_weights: {file: " MHE_TEST_SOURCE_DIR "/tests/ocp/tasks.xml, LARMl: 4}}\n"
     "costs: [{plugin: mhe.cost.min-excitation, markers: 100},\n"
     "  {plugin: mhe.cost.track, signal: markers, sigma: 0.1, huber: 3}]\n",
+    /* what joints pass on: of controls, residual torques and accelerations; without residuals, also
+     * at the last node; of the node before; two of them */
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\nformulation: activation\n"
+    "bounds: {residual_torques: true}\ncosts: [{plugin: mhe.cost.track, signal: "
+    "joint_reaction/Arm, sigma: 100}, {plugin: mhe.cost.min-excitation}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\ncosts: [{plugin: mhe.cost.track, signal: "
+    "joint_reaction/LowerArm1, sigma: 100, value: [0]}, {plugin: mhe.cost.min-excitation}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\nformulation: activation\n"
+    "costs: [{plugin: mhe.cost.rate, signal: joint_reaction/Arm, sigma: 1e4},\n"
+    "  {plugin: mhe.cost.track, signal: joint_reaction/LowerArm1, sigma: 100, value: [0]}]\n",
+    /* with a load in the hand */
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021}\nformulation: activation\n"
+    "bounds: {residual_torques: true}\ndata: {external_loads: " MHE_TEST_SOURCE_DIR
+    "/tests/ocp/hand_loads.xml}\ncosts: [{plugin: mhe.cost.track, signal: joint_reaction/Arm, "
+    "sigma: 100, value: [0]}]\n",
 };
 
 typedef struct point {

@@ -14,6 +14,7 @@ typedef struct test_fixture {
     mhi_ocp *ocp;
     mhe_host host;
     int32_t n_warnings; /* lines the host was given */
+    char told[4096];    /* these */
     mhe_error err;
 } test_fixture;
 

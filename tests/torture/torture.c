@@ -250,6 +250,10 @@ static int judge(const torture *t, const outcome *o, const char **detail) {
     if (status == 0) {
         return o->n_lines == 0 && same_results(t, detail) ? SAME : DIFFERENT;
     }
+    if (t->allocation && status == 127) { /* as the dynamic linker ends a program within dlopen() */
+        *detail = "the dynamic linker";
+        return FOREIGN;
+    }
     if (o->n_lines != 1 || status > 2) {
         *detail = library != NULL ? library : o->line;
         return library != NULL ? FOREIGN : SILENT;

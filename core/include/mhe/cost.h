@@ -19,6 +19,9 @@
  *   actuator         [n_actuators]  1, in parts of the optimal force; only where switched on
  *   loop_gap, loop_rate  three or six a loop of the model; m, m/s (of welds also 1, rad/s). Where
  *                    there are any the problem has terms of its own that bring them to 0
+ *   joint_reaction/JOINT  [3]       N, force of a joint on the body that it carries, in the axes of
+ *                    the body that it sits on; JOINT: its name or that of the body it carries. Of
+ *                    four joints at most, made when find_signal() is asked for them
  *
  * Missing data: a missing sample is NaN in `y_ref`; a signal that has no value at a node (controls
  * at the last node) is NaN in `y`. A residual must let NaN through; the core then drops its row and

@@ -13,6 +13,8 @@
 #include "estimator/recording.h"
 #include "model/system.h"
 
+#define MHI_HARDLY_MOVES 0.06 /* rad: a motion that is smaller in every joint is none */
+
 /* Where measured angles came from, for messages. */
 typedef struct mhi_angles_source {
     const char *path;

@@ -10,7 +10,6 @@
 #define SLACK 0.1         /* rad or m: so far people move beyond a model's range */
 #define OFTEN 0.05        /* share of the frames */
 #define FULL_TURN 6.3     /* no joint moves further, in rad */
-#define HARDLY_MOVES 0.06 /* rad: a motion that is smaller in every joint is none */
 
 typedef struct span {
     double low, high;
@@ -62,7 +61,7 @@ static int32_t hardly_moves(const mhe_description *d, const mhi_recording *r, do
             *most = fmax(*most, fmax(fabs(s.low), fabs(s.high)));
         }
     }
-    return *most > 0 && *most < HARDLY_MOVES;
+    return *most > 0 && *most < MHI_HARDLY_MOVES;
 }
 
 mhe_status mhi_believe_angles(const mhe_description *d, const mhi_recording *r,

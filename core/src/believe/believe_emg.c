@@ -18,14 +18,20 @@
 #define WHOLE 0.9       /* share of frames with EMG that is all but a filter's run-in */
 #define FLAT 0.3        /* s of one and the same value */
 #define FLAT_SHARE 0.02 /* of the recording */
+#define REST 0.02       /* of the MVC: a muscle at rest, as far as forces are concerned */
+#define REST_SHARE 0.05 /* of the samples; people rest each muscle for longer in a recording */
+#define REST_TIME 1.0   /* s: in a shorter recording they may not */
+#define REST_CHANNELS 3 /* of so many and more one rests at times */
+#define MANY 6          /* of so many and more one rests nearly always; else ... */
+#define TENSE 0.25      /* ... in that share of the frames all have something in common */
 
 typedef struct channel {
     double low, high;
-    int32_t n, n_below, n_beyond, n_flat;
+    int32_t n, n_below, n_beyond, n_flat, n_rest;
 } channel;
 
 static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
-    channel c = {INFINITY, -INFINITY, 0, 0, 0, 0};
+    channel c = {INFINITY, -INFINITY, 0, 0, 0, 0, 0};
     int32_t run = 0;
     double last = NAN;
     for (int32_t k = 0; k < r->n_frames; k++) {
@@ -35,7 +41,7 @@ static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
             run = 0;
             continue;
         }
-        run = value == last && value != 0 ? run + 1 : 0; /* 0 is a muscle at rest */
+        run = value == last && fabs(value) > REST ? run + 1 : 0; /* rest may be rounded */
         c.n_flat += run > FLAT * r->rate;
         last = value;
         c.low = fmin(c.low, value);
@@ -43,6 +49,7 @@ static channel look_at(const mhi_recording *r, int32_t n_m, int32_t muscle) {
         c.n++;
         c.n_below += value < BELOW;
         c.n_beyond += value > BEYOND;
+        c.n_rest += value < REST;
     }
     return c;
 }
@@ -76,6 +83,51 @@ static mhe_status check_scale(const char *path, const channel *all, int32_t n, m
                                     : "raw EMG? The section emg with channels makes shares of it.");
     }
     return MHE_OK;
+}
+
+/* Share of the frames with EMG in which no channel is at rest. */
+static double tense_share(const mhi_recording *r, int32_t n_m) {
+    int32_t n = 0, n_tense = 0;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        double least = INFINITY;
+        for (int32_t i = 0; i < n_m; i++) {
+            least = fmin(least, r->emg[(ptrdiff_t)k * n_m + i]); /* passes NaN over */
+        }
+        n += isfinite(least);
+        n_tense += isfinite(least) && least > REST;
+    }
+    return n == 0 ? 0 : (double)n_tense / n;
+}
+
+/* What adds to all channels is at once in all of them, and leaves none at rest. */
+static void check_rest(const char *path, const mhe_description *d, const mhi_recording *r,
+                       const channel *all, mhi_findings *findings) {
+    int32_t n_there = 0, n_restless = 0;
+    double least = INFINITY;
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        n_there += all[i].n > 0;
+        n_restless += all[i].n > 0 && all[i].n_rest < REST_SHARE * all[i].n;
+        least = fmin(least, all[i].low);
+    }
+    const double tense = tense_share(r, d->n_muscles);
+    if (r->n_frames < REST_TIME * r->rate) {
+        return;
+    }
+    if (n_there >= REST_CHANNELS && n_restless == n_there) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an offset, mains hum or noise that was not taken off? Take off what each "
+                         "channel shows at rest: it moves all forces up",
+                         "%s: none of %d muscles is ever at rest (below %.0f %% of its MVC; the "
+                         "least is %.0f %%)",
+                         path, n_there, 100 * REST, 100 * least);
+    } else if (n_there >= MANY && tense > TENSE) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an artefact that all channels have in common, hum, or a clock? High-pass "
+                         "raw EMG (20 Hz) before its envelope is made",
+                         "%s: all of %d muscles are active at once (above %.0f %% of the MVC) in "
+                         "%.0f %% of the frames",
+                         path, n_there, 100 * REST, 100 * tense);
+    }
 }
 
 /* One list of muscles a kind. */
@@ -204,6 +256,7 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
     }
     if (status == MHE_OK) {
         check_channels(path, d, r, all, findings);
+        check_rest(path, d, r, all, findings);
         check_overlap(path, r, d->n_muscles, findings);
     }
     free(all);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "base/text.h"
+#include "base/values.h"
 #include "believe/believe.h"
 
 #include <math.h>
@@ -10,6 +11,10 @@
 #define STILL_SHARE 0.01  /* of the frames */
 #define MISSING_SHARE 0.2 /* of the frames without any marker */
 #define MOVES 1e-4        /* m: a recording in which nothing moves more shows no motion */
+#define JUMP 0.01         /* m of most markers together between two frames, beyond ... */
+#define FASTEST 50.0      /* ... what so large a change of velocity (m/s2) makes of it ... */
+#define JUMPS_OUT 6.0     /* ... and so many times what they do otherwise */
+#define TOGETHER 3        /* markers */
 
 /* Frames in which a marker repeats the one before, in runs longer than STILL. */
 static int32_t count_still(const mhi_recording *r, int32_t n_k, int32_t marker, double *range) {
@@ -35,6 +40,19 @@ static int32_t count_still(const mhi_recording *r, int32_t n_k, int32_t marker, 
     return n;
 }
 
+/* Carried by the ground or by what nothing moves: such a marker may rest where motion is simulated.
+ */
+static int is_at_rest(const mhe_description *d, int32_t marker) {
+    for (int32_t b = d->markers[marker].body; b >= 0; b = d->bodies[b].parent) {
+        for (int32_t k = 0; k < d->bodies[b].n_motions; k++) {
+            if (d->bodies[b].motions[k].coordinate >= 0) {
+                return 0;
+            }
+        }
+    }
+    return 1;
+}
+
 static void check_still(const char *path, const mhe_description *d, const mhi_recording *r,
                         mhi_findings *findings) {
     mhi_text still = {0};
@@ -43,7 +61,7 @@ static void check_still(const char *path, const mhe_description *d, const mhi_re
         double range = 0;
         const int32_t n = count_still(r, d->n_markers, i, &range);
         n_moving += range > MOVES;
-        if (n > STILL_SHARE * r->n_frames) {
+        if (n > STILL_SHARE * r->n_frames && !is_at_rest(d, i)) {
             mhi_text_add(&still, "%s%s (%.0f %% of the frames)", still.length == 0 ? "" : ", ",
                          d->markers[i].name, 100.0 * n / r->n_frames);
         }
@@ -55,6 +73,59 @@ static void check_still(const char *path, const mhe_description *d, const mhi_re
                          "%s: positions repeat to the last digit: %s", path, still.data);
     }
     mhi_text_free(&still);
+}
+
+/* How far most markers leave, from frame k - 1 to k, the way that they take before and after: the
+ * median of each axis, m; NaN: too few are there. */
+static double jump_at(const mhi_recording *r, int32_t n_k, int32_t k, double *each) {
+    const ptrdiff_t row = 3 * (ptrdiff_t)n_k;
+    const double *t = r->time + k, most = 1.5 * (t[0] - t[-1]);
+    double square = 0;
+    int32_t n = 0;
+    if (t[-1] - t[-2] > most || t[1] - t[0] > most) {
+        return NAN;
+    }
+    for (int32_t axis = 0; axis < 3; axis++) {
+        n = 0;
+        for (int32_t i = 0; i < n_k; i++) {
+            const double *p = r->markers + k * row + 3 * i + axis;
+            const double jump = p[0] - p[-row] - 0.5 * (p[-row] - p[-2 * row] + p[row] - p[0]);
+            if (!isnan(jump)) {
+                each[n++] = jump;
+            }
+        }
+        mhi_sort(each, n);
+        const double median = n == 0 ? NAN : 0.5 * (each[(n - 1) / 2] + each[n / 2]);
+        square += median * median;
+    }
+    return n < TOGETHER ? NAN : sqrt(square);
+}
+
+/* A system that was moved or calibrated anew, two recordings in one file. */
+static void check_jump(const char *path, const mhe_description *d, const mhi_recording *r,
+                       mhi_findings *findings) {
+    double *all = malloc(sizeof *all * ((size_t)r->n_frames + (size_t)d->n_markers + 1)), most = 0;
+    int32_t n = 0, at = 0;
+    for (int32_t k = 2; k + 1 < r->n_frames && all != NULL; k++) {
+        const double jump = jump_at(r, d->n_markers, k, all + r->n_frames);
+        if (!isnan(jump)) {
+            all[n++] = jump;
+            at = jump > most ? k : at;
+            most = fmax(most, jump);
+        }
+    }
+    if (n > 0) {
+        mhi_sort(all, n);
+        const double step = r->time[at] - r->time[at - 1];
+        if (most > JUMP + FASTEST * step * step && most > JUMPS_OUT * all[n / 2]) {
+            mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                             "was the system moved or calibrated anew, or are these two "
+                             "recordings? Estimate the parts one by one",
+                             "%s: most markers jump by %.0f mm from %.6g to %.6g s", path,
+                             1e3 * most, r->time[at - 1], r->time[at]);
+        }
+    }
+    free(all);
 }
 
 void mhi_believe_markers(const mhi_run *run, const mhe_description *d, const mhi_recording *r,
@@ -80,4 +151,5 @@ void mhi_believe_markers(const mhi_run *run, const mhe_description *d, const mhi
             "%s: %.0f %% of the frames have no marker", path, 100.0 * n_empty / r->n_frames);
     }
     check_still(path, d, r, findings);
+    check_jump(path, d, r, findings);
 }

@@ -17,6 +17,7 @@
 #define LARGE_TORQUE 0.5 /* residual torque over the muscles' moment, RMS */
 #define LARGE_SIZE 20.0  /* N m: worth a word whatever the muscles do */
 #define DISAGREES 0.15   /* RMS difference of EMG and estimate */
+#define STRETCH 0.5      /* s */
 
 mhe_status mhi_diagnosis_create(const mhe_estimator_info *info, const mhi_run *run,
                                 const mhi_recording *recording, const mhi_system *system,
@@ -42,12 +43,15 @@ mhe_status mhi_diagnosis_create(const mhe_estimator_info *info, const mhi_run *r
     d->at_end = MHI_TAKE(&arena, int32_t, info->n_q);
     d->exchanged = MHI_TAKE(&arena, int32_t, n_k * n_k);
     d->compared = MHI_TAKE(&arena, int32_t, n_k * n_k);
+    d->lag.emg = MHI_TAKE(&arena, double, info->n_muscles);
+    d->lag.residual = MHI_TAKE(&arena, double, info->n_muscles);
     d->arena = arena;
-    if (!d->distance || !d->emg || !d->markers || !d->muscles || !d->torques || !d->moments ||
-        !d->at_bound || !d->at_end || !d->exchanged || !d->compared) {
+    if (!d->lag.emg || !d->lag.residual || !d->distance || !d->emg || !d->markers || !d->muscles ||
+        !d->torques || !d->moments || !d->at_bound || !d->at_end || !d->exchanged || !d->compared) {
         mhi_diagnosis_free(d);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
+    mhi_lag_begin(&d->lag, info->n_muscles);
     *result = d;
     return MHE_OK;
 }
@@ -75,6 +79,23 @@ static double apart2(const double *a, const double *b) {
         sum += (a[i] - b[i]) * (a[i] - b[i]);
     }
     return sum;
+}
+
+static void add_stretch(mhi_diagnosis *d, double time) {
+    mhi_stretch *s = &d->stretch;
+    s->from = s->n == 0 ? time : s->from;
+    s->to = time;
+    for (int32_t i = 0; i < d->info->n_markers; i++) {
+        if (!isnan(d->distance[i])) {
+            s->squares += d->distance[i] * d->distance[i];
+            s->n++;
+        }
+    }
+    if (s->n > 0 && s->to - s->from >= STRETCH) {
+        d->worst =
+            d->worst.n == 0 || s->squares / s->n > d->worst.squares / d->worst.n ? *s : d->worst;
+        *s = (mhi_stretch){0};
+    }
 }
 
 static void add_markers(mhi_diagnosis *d, const double *measured, const double *estimated) {
@@ -135,6 +156,7 @@ void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     add_left_out(d, e);
     const double *emg = measured(f, e, "emg");
     add_markers(d, measured(f, e, "markers"), e->markers);
+    add_stretch(d, e->time);
     const double *control = e->excitation != NULL ? e->excitation : e->activation;
     const double most =
         e->excitation != NULL ? d->run->bounds.excitation_max : d->run->bounds.activation_max;
@@ -143,6 +165,7 @@ void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
         count(&d->muscles[i], control[i] - d->emg[i]);
         d->at_bound[i] += control[i] >= AT_BOUND * most;
     }
+    mhi_lag_add(&d->lag, f->n_muscles, e->time, d->emg, control);
     for (int32_t i = 0; i < f->n_q; i++) {
         count(&d->moments[i], e->moment[i]);
         count(&d->torques[i], i < f->n_residual_torques ? e->residual[i] : 0);

@@ -13,6 +13,10 @@
 #define MARKERS_FAR \
     0.008 /* m RMS over all markers: angles may be 2 degrees off (docs/believability.md) */
 #define MARKERS_LOST 0.06
+#define LATE 0.04        /* s that EMG seems late; the electromechanical delay is as large */
+#define EARLY (-0.02)    /* s */
+#define LATE_SHARE 0.15  /* of the difference that this explains at least */
+#define LONG 0.1         /* s between nodes: excitation does not change there */
 #define MARKER_FAR 0.025 /* m RMS of a single one, and ... */
 #define STANDS_OUT 3.0   /* ... times the median marker's */
 #define DOUBTED 0.2      /* of a marker's or channel's samples not believed */
@@ -23,6 +27,9 @@
 #define TORQUE_LARGE 1.0 /* times the muscles' moment, RMS */
 #define TORQUE_LEAST 1.0 /* N m */
 #define LIFTS 0.2        /* of the body's weight by a residual force that holds it up */
+#define PUSHES 0.05 /* of the body's weight by any residual force at a free base, RMS, and ... */
+#define TURNS 0.04  /* ... m of lever arm of it by a moment: Hicks et al. (2015, */
+                    /* doi:10.1115/1.4029304) call more than 25 N and 50 N m bad in walking */
 
 mhi_channel_tally mhi_diagnosis_marker(const mhi_diagnosis *d, int32_t i) {
     const mhi_tally *t = &d->markers[i];
@@ -75,6 +82,15 @@ static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
         mhi_findings_add(findings, all > MARKERS_LOST ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL,
                          "is the model scaled to this person, do labels and markers' places agree?",
                          "the markers are %.1f mm from the estimate (RMS)", 1e3 * all);
+    }
+    const mhi_stretch *w = &d->worst;
+    const double part = w->n > 0 ? sqrt(w->squares / w->n) : 0;
+    if (all <= MARKERS_FAR && part > MARKERS_FAR) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "what changed there: the system, a marker, the person's place?",
+                         "the markers are %.1f mm from the estimate (RMS) from %.4g to %.4g s, "
+                         "%.1f mm over all",
+                         1e3 * part, w->from, w->to, 1e3 * all);
     }
     for (int32_t i = 0; i < f->n_markers; i++) {
         const double rms = mhi_tally_rms(&d->markers[i]);
@@ -129,6 +145,24 @@ static void judge_emg(const mhi_diagnosis *d, mhi_findings *findings) {
     mhi_text_free(&far);
 }
 
+static void judge_times(const mhi_diagnosis *d, mhi_findings *findings) {
+    double share;
+    const double late = mhi_lag_seconds(&d->lag, &share);
+    if (share > LATE_SHARE && (late > LATE || late < EARLY)) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "have EMG and markers one clock? data.emg_offset moves the EMG, delay of "
+                         "an electrode is its electromechanical delay",
+                         "the EMG seems %s by %.0f ms or more", late > 0 ? "late" : "early",
+                         1e3 * fabs(late));
+    }
+    const double interval = d->info->ratio / d->recording->rate;
+    if (interval > LONG) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "smaller horizon.ratio, or more frames a second",
+                         "%.3g s between nodes: muscles change faster", interval);
+    }
+}
+
 static void judge_bounds(const mhi_diagnosis *d, mhi_findings *findings) {
     const mhe_estimator_info *f = d->info;
     mhi_text full = {0}, ends = {0};
@@ -159,21 +193,57 @@ static void judge_bounds(const mhi_diagnosis *d, mhi_findings *findings) {
     mhi_text_free(&ends);
 }
 
-/* 1 where a coordinate moves a body along the vertical. */
-static int32_t is_vertical(const mhe_description *m, int32_t coordinate) {
+/* What a coordinate moves of the body that floats, which only loads can push. */
+typedef enum base_motion { NOT_OF_A_BASE, SIDEWAYS, UP, TURN } base_motion;
+
+static base_motion moves_base(const mhe_description *m, int32_t coordinate) {
     const double *g = m->gravity;
     const double size = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    base_motion is = NOT_OF_A_BASE;
     for (int32_t i = 0; i < m->n_bodies; i++) {
+        int32_t floats = 0;
         for (int32_t k = 0; k < m->bodies[i].n_motions && m->bodies[i].parent < 0; k++) {
             const mhe_motion *o = &m->bodies[i].motions[k];
             const double along = g[0] * o->axis[0] + g[1] * o->axis[1] + g[2] * o->axis[2];
-            if (o->coordinate == coordinate && o->kind == MHE_MOTION_TRANSLATION &&
-                fabs(along) > 0.9 * size && size > 0) {
-                return 1;
+            const int32_t shifts = o->kind == MHE_MOTION_TRANSLATION && o->coordinate >= 0;
+            const int32_t up = shifts && fabs(along) > 0.9 * size && size > 0;
+            floats |= up;
+            if (o->coordinate == coordinate) {
+                is = up ? UP : shifts ? SIDEWAYS : TURN;
             }
         }
+        if (is != NOT_OF_A_BASE) {
+            return floats ? is : NOT_OF_A_BASE;
+        }
     }
-    return 0;
+    return NOT_OF_A_BASE;
+}
+
+/* 1: told. */
+static int32_t judge_base(const mhi_diagnosis *d, int32_t i, double weight,
+                          mhi_findings *findings) {
+    const base_motion is = moves_base(mhi_system_description(d->system), i);
+    const double residual = mhi_tally_rms(&d->torques[i]);
+    const char *name = d->info->coordinate_names[i];
+    if (is == UP && residual > LIFTS * weight) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "a foot on the ground whose load is not given? data.external_loads",
+                         "the residual force at %s is %.0f N (RMS), the body weighs %.0f N", name,
+                         residual, weight);
+    } else if ((is == UP || is == SIDEWAYS) && residual > PUSHES * weight) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "do the loads' directions, scale and times, and the model's mass, fit?",
+                         "the residual force at %s is %.0f N (RMS), the body weighs %.0f N", name,
+                         residual, weight);
+    } else if (is == TURN && residual > TURNS * weight) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "do the loads' points, directions and times fit the motion?",
+                         "the residual moment at %s is %.0f N m (RMS), nothing real gives it", name,
+                         residual);
+    } else {
+        return 0;
+    }
+    return 1;
 }
 
 static void judge_torques(const mhi_diagnosis *d, mhi_findings *findings) {
@@ -186,13 +256,8 @@ static void judge_torques(const mhi_diagnosis *d, mhi_findings *findings) {
     }
     for (int32_t i = 0; i < f->n_q; i++) {
         const double torque = mhi_tally_rms(&d->torques[i]);
-        if (is_vertical(m, i) && torque > LIFTS * weight) {
-            mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
-                             "a foot on the ground whose load is not given? data.external_loads",
-                             "the residual force at %s is %.0f N (RMS), the body weighs %.0f N",
-                             f->coordinate_names[i], torque, weight);
-        } else if (m->coordinates[i].rotational && torque > TORQUE_LEAST &&
-                   torque > TORQUE_LARGE * mhi_tally_rms(&d->moments[i])) {
+        if (!judge_base(d, i, weight, findings) && m->coordinates[i].rotational &&
+            torque > TORQUE_LEAST && torque > TORQUE_LARGE * mhi_tally_rms(&d->moments[i])) {
             mhi_text_add(&large, "%s%s %.1f N m (muscles %.1f)", large.length == 0 ? "" : ", ",
                          f->coordinate_names[i], torque, mhi_tally_rms(&d->moments[i]));
         }
@@ -210,6 +275,7 @@ void mhi_diagnosis_judge(const mhi_diagnosis *d, mhi_findings *findings) {
         judge_solves(d, findings);
         judge_markers(d, findings);
         judge_emg(d, findings);
+        judge_times(d, findings);
         judge_bounds(d, findings);
         judge_torques(d, findings);
     }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* motion.c: the range of joint angles that a recording is known to keep to, before it is read. */
 #include "base/pi.h"
+#include "believe/believe.h"
 #include "estimator/estimator_private.h"
 #include "io/model_file.h"
 #include "io/table.h"
@@ -15,6 +16,26 @@ static void column_range(const mhi_table *table, int32_t c, double scale, double
         const double value = scale * table->values[k * table->n_columns + c];
         *lower = isnan(*lower) ? value : fmin(*lower, value); /* fmin passes over NaN */
         *upper = isnan(*upper) ? value : fmax(*upper, value);
+    }
+}
+
+/* A file in degrees whose angles are so small that they may be radians: paths would be fitted to
+ * next to nothing. */
+static void tell_small(const mhe_description *d, const double *lower, const double *upper,
+                       const mhi_table *table, const mhe_host *host) {
+    double most = 0;
+    for (int32_t i = 0; i < d->n_coordinates; i++) {
+        if (d->coordinates[i].rotational && !isnan(lower[i])) {
+            most = fmax(most, fmax(fabs(lower[i]), fabs(upper[i])));
+        }
+    }
+    if (table->in_degrees && most > 0 && most < MHI_HARDLY_MOVES) {
+        mhe_error note = {0};
+        (void)mhe_fail(&note, MHE_E_INPUT,
+                       "%s:%d: model.motion: no angle is larger than %.3g degrees: if they are "
+                       "radians, write 'inDegrees=no' into the header",
+                       table->path, (int)table->line, most * 180 / MHI_PI);
+        host->log(host, MHE_LOG_WARNING, note.text);
     }
 }
 
@@ -62,6 +83,10 @@ mhe_status mhi_estimator_motion(const mhi_run *run, mhe_description *d, const mh
                        "the others' whole ranges",
                        file, (int)n_found, (int)d->n_coordinates);
         host->log(host, MHE_LOG_WARNING, note.text);
+    }
+    if (status == MHE_OK &&
+        run->model_file.motion != NULL) { /* data.angles are looked at as they are read */
+        tell_small(d, lower, upper, table, host);
     }
     mhi_table_free(table);
     return status;

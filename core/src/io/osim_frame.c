@@ -234,6 +234,11 @@ int32_t mhi_osim_location(mhi_osim *o, xmlNode *object, const char **body, doubl
     if (socket == NULL) {
         socket = mhi_xml_word(o, object, "body");
     }
+    if (mhi_xml_word(o, object, "location") == NULL) {
+        mhi_build_warn(&o->b, mhi_xml_line(object),
+                       "%s '%s' has no location: as in OpenSim it lies at 0 0 0 of its frame",
+                       (const char *)object->name, mhi_xml_name(o, object));
+    }
     (void)mhi_xml_numbers(o, object, "location", point, 3);
     if (!mhi_osim_resolve(o, socket, "", mhi_xml_line(object), body, &in_body)) {
         return 0;

@@ -296,6 +296,10 @@ void mhi_osim_bodies(mhi_osim *o) {
         if (draft == NULL) {
             return;
         }
+        if (mhi_xml_word(o, n, "mass") == NULL) {
+            mhi_build_warn(&o->b, mhi_xml_line(n), "body '%s' has no mass: as in OpenSim it is 0",
+                           name);
+        }
         (void)mhi_xml_numbers(o, n, "mass", &draft->body.mass, 1);
         (void)mhi_xml_numbers(o, n, "mass_center", draft->body.com, 3);
         read_inertia(o, n, draft->body.inertia);

@@ -44,8 +44,12 @@ static void read_moving_axis(mhi_osim *o, xmlNode *node, const char *whose, int 
     if (found == 0) {
         found = mhi_osim_function_of(o, node, old[axis], whose, &f);
     }
+    if (found == 0) {
+        mhi_build_warn(&o->b, mhi_xml_line(node), "%s has no %s: as in OpenSim it stays at 0 there",
+                       whose, locations[axis]);
+    }
     if (found != 1) {
-        return; /* none: stays at 0 */
+        return;
     }
     if (coordinate == NULL || mhi_function_is_constant(&f)) {
         out->location[axis] = mhi_function_value(&f, 0);

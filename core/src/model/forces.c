@@ -308,15 +308,21 @@ mhe_status mhi_forces_evaluate(mhi_system_context *c, const mhe_system_point *at
     return status;
 }
 
-mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
-                           mhi_force_loads *loads, void *data, mhe_error *err) {
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at,
+                           const mhi_path_pulls *pulls, mhi_force_loads *loads, void *data,
+                           mhe_error *err) {
+    const int32_t derivatives = pulls->by_length != NULL;
     const mhi_system *s = c->system;
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < s->n_forces && status == MHE_OK; i++) {
         const mhe_force_layout *l = &s->forces[i].layout;
-        status = evaluate_one(c, &s->forces[i], at, 0, err);
+        status = evaluate_one(c, &s->forces[i], at, derivatives, err);
         for (int32_t k = 0; k < l->n_paths && status == MHE_OK; k++) {
-            tension[l->paths[k]] += c->tension[k];
+            pulls->tension[l->paths[k]] += c->tension[k];
+            if (derivatives) {
+                pulls->by_length[l->paths[k]] += c->tension_l[k];
+                pulls->by_rate[l->paths[k]] += c->tension_w[k];
+            }
         }
         if (status == MHE_OK && l->n_loads > 0) {
             status = loads(data, l->loads, l->n_loads, c->load, err);

@@ -22,6 +22,13 @@
  * [n + 6 i, n + 6 i + 6), n those of `d`. Memory from `arena`; `d` must outlive it. [cold] */
 mhe_status mhi_joints_open(const mhe_description *d, mhi_arena *arena, mhe_description *out,
                            mhe_error *err);
+/* `d` with three shifts alone, before the own motions of `body`'s joint: along axes that the parent
+ * body holds fast (those of joint_r), whatever the coordinates. Numbers [n, n + 3). [cold] */
+mhe_status mhi_joints_loosen(const mhe_description *d, int32_t body, mhi_arena *arena,
+                             mhe_description *out, mhe_error *err);
+/* A model plugin's config with true paths: a fit knows nothing of a joint's own motions. [cold] */
+mhe_status mhi_joints_exact_paths(const mhe_plugin *model, const void *config, mhi_arena *arena,
+                                  const void **exact, mhe_error *err);
 /* Force and moment of body i's joint on the body: `poses` [12 x n_bodies] as kinematics() gives
  * them, `tau` of the opened description `d`, of which `n` are its own. */
 void mhi_joints_reaction(const mhe_description *d, int32_t i, const double *poses,
@@ -29,7 +36,7 @@ void mhi_joints_reaction(const mhe_description *d, int32_t i, const double *pose
 
 /* Reactions of a system's joints. */
 typedef struct mhi_reactions mhi_reactions;
-/* MHE_E_UNSUPPORTED: a muscle whose path has no points; loops. `setup` is the one of the system.
+/* MHE_E_UNSUPPORTED: a muscle whose path has no points. `setup` is the one of the system.
  * [cold] */
 mhe_status mhi_reactions_create(const mhi_system_setup *setup, const mhi_system *system,
                                 mhi_reactions **reactions, mhe_error *err);

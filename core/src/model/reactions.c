@@ -2,7 +2,6 @@
 /* reactions.c: what the joints of a system transmit at a state of its motion. */
 #include "model/joints.h"
 
-#include "config/options_table.h"
 #include "model/actuators.h"
 #include "model/system_private.h"
 #include "plugin/instance.h"
@@ -21,28 +20,6 @@ struct mhi_reactions {
     double *tension;          /* [n_paths] */
     mhi_arena arena;
 };
-
-/* The model's config, with true paths: a fit knows nothing of a joint's own motions. */
-static mhe_status exact_paths(const mhi_system_setup *setup, mhi_arena *arena, const void **config,
-                              mhe_error *err) {
-    const mhe_plugin *plugin = setup->model;
-    void *own = mhi_arena_take(arena, plugin->config_size);
-    if (own == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    memcpy(own, setup->model_config, plugin->config_size);
-    for (uint32_t i = 0; i < plugin->option_count; i++) {
-        const mhe_option *o = &plugin->options[i];
-        if (strcmp(o->key, "paths") == 0 && o->type == MHE_TYPE_ENUM) {
-            const int32_t exact = mhi_choice_find(o->choices, "exact");
-            if (exact >= 0) {
-                memcpy((char *)own + o->offset, &exact, sizeof exact);
-            }
-        }
-    }
-    *config = own;
-    return MHE_OK;
-}
 
 static mhe_status take(mhi_reactions *r, mhe_error *err) {
     const int32_t n = r->opened.n_coordinates, n_p = r->opened.n_paths;
@@ -78,14 +55,10 @@ static mhe_status build(mhi_reactions *r, const mhi_system_setup *setup, mhe_err
                             i < d->n_muscles ? d->muscles[i].name : "a spring");
         }
     }
-    if (d->n_loops > 0) {
-        return mhe_fail(err, MHE_E_UNSUPPORTED,
-                        "output.reactions: the model has loops, and what their joints transmit "
-                        "is not known yet");
-    }
     mhe_status status = mhi_joints_open(d, &r->arena, &r->opened, err);
     if (status == MHE_OK) {
-        status = exact_paths(setup, &r->arena, &config, err);
+        r->opened.n_loops = 0; /* what closes them is a load here */
+        status = mhi_joints_exact_paths(setup->model, setup->model_config, &r->arena, &config, err);
     }
     if (status == MHE_OK) {
         status = take(r, err);
@@ -159,6 +132,7 @@ mhe_status mhi_reactions_solve(mhi_reactions *r, mhi_system_context *c, const mh
     }
     memset(r->tension, 0, sizeof(double) * (size_t)d->n_paths);
     memset(r->given, 0, sizeof(double) * (size_t)n);
+    const mhi_path_pulls pulls = {r->tension, NULL, NULL};
     memcpy(r->tension, c->force, sizeof(double) * (size_t)face->n_m);
     memcpy(r->q, at->q, sizeof(double) * (size_t)n_q); /* the joints' own stay at 0 */
     memcpy(r->v, at->v, sizeof(double) * (size_t)n_q);
@@ -170,7 +144,11 @@ mhe_status mhi_reactions_solve(mhi_reactions *r, mhi_system_context *c, const mh
         status = r->model->inverse_dynamics(r->context, r->a, r->tau, NULL, NULL, err);
     }
     if (status == MHE_OK) {
-        status = mhi_forces_pull(c, at, r->tension, add_loads, r, err);
+        status = mhi_forces_pull(c, at, &pulls, add_loads, r, err);
+    }
+    if (status == MHE_OK && r->system->n_loop_loads > 0) {
+        mhi_loops_loads(c, 1);
+        status = add_loads(r, r->system->loop_loads, r->system->n_loop_loads, c->loop_value, err);
     }
     if (status == MHE_OK && r->system->n_actuators > 0) {
         status = add_actuators(r, at->r + r->system->n_residual, err);

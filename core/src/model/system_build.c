@@ -170,6 +170,8 @@ mhe_status mhi_system_create(const mhi_system_setup *setup, mhi_system **system,
     s->description = d;
     s->formulation = setup->formulation;
     s->model = setup->model->ops;
+    s->model_plugin = setup->model;
+    s->model_config = setup->model_config;
     s->muscle = setup->muscle->ops;
     s->n_paths = d->n_paths;
     s->face = (mhe_system){.size = sizeof s->face,

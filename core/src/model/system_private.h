@@ -26,6 +26,8 @@ struct mhi_system {
     const mhe_description *description;
     int32_t formulation;
     const mhe_model_ops *model;
+    const mhe_plugin *model_plugin;
+    const void *model_config;
     const mhe_muscle_ops *muscle;
     void *model_self, *muscle_self;
     mhe_muscle_layout muscle_layout;
@@ -160,17 +162,25 @@ mhe_status mhi_loops_close(mhi_system_context *c, int32_t derivatives, double *v
  * inverse dynamics. */
 mhe_status mhi_loops_linearise(mhi_system_context *c, const double *vdot, double *tau_q,
                                mhe_error *err);
+/* `share` times what closes them on s->loop_loads, into c->loop_value [n_loop_loads x 9]: of the
+ * context's last acceleration. */
+void mhi_loops_loads(mhi_system_context *c, double share);
 void mhi_loops_closed(const mhi_system_context *c, int32_t by, double *columns, int32_t n);
 
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
  * in other_q, other_v. Needs the kinematics of `at` in the context. */
 mhe_status mhi_forces_create(mhi_system *s, const mhi_system_setup *setup, mhe_error *err);
-/* Tensions of the force plugins' paths, added to `tension` [n_paths], and each plugin's loads.
- * Needs the kinematics of `at` in the context. */
+/* Tensions of the force plugins' paths [n_paths] and, where they are not NULL, their derivatives by
+ * length and its rate, all added to what is there; and each plugin's loads. Needs the kinematics of
+ * `at` in the context. */
+typedef struct mhi_path_pulls {
+    double *tension, *by_length, *by_rate;
+} mhi_path_pulls;
 typedef mhe_status mhi_force_loads(void *data, const mhe_load *loads, int32_t n,
                                    const double *values, mhe_error *err);
-mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at, double *tension,
-                           mhi_force_loads *loads, void *data, mhe_error *err);
+mhe_status mhi_forces_pull(mhi_system_context *c, const mhe_system_point *at,
+                           const mhi_path_pulls *pulls, mhi_force_loads *loads, void *data,
+                           mhe_error *err);
 /* Each is finite at the model's default posture; once the system is whole. */
 mhe_status mhi_forces_check(mhi_system *s, mhe_error *err);
 void mhi_forces_destroy(mhi_system *s);

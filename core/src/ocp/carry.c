@@ -45,13 +45,12 @@ void mhi_ocp_read_carried(const mhi_ocp *ocp, int32_t k, const double *x, double
 }
 
 /* m_{k+1} = y(x_k, u_k) and its rows of A and B [n_x_next of face.n_x]; A NULL: not wanted. */
-static mhe_status carry(const mhi_ocp *ocp, mhi_ocp_worker *w, const double *x, const double *u,
-                        double *next, double *A, double *B, mhe_error *err) {
+static mhe_status carry(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
+                        const double *u, double *next, double *A, double *B, mhe_error *err) {
     const int32_t n_x = ocp->face.n_x, n_u = ocp->face.n_u;
     mhe_status status = MHE_OK;
     if (!w->linearised) {
-        status = mhi_signals_evaluate(&ocp->signals, ocp->system, w->system, ocp->carried, x, u,
-                                      w->y, A == NULL ? NULL : w->jacobian, err);
+        status = mhi_ocp_measure(ocp, w, k, ocp->carried, x, u, A != NULL, err);
     }
     for (int32_t i = 0; i < MHI_N_SIGNALS && status == MHE_OK; i++) {
         const mhi_signal *s = &ocp->signals.signal[i];
@@ -103,14 +102,14 @@ mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double
         if (out->A != NULL) {
             widen(ocp, w, out->A, out->B);
         }
-        status = carry(ocp, w, x, u, out->x_next, out->A, out->B, err);
+        status = carry(ocp, w, k, x, u, out->x_next, out->A, out->B, err);
     }
     return status;
 }
 
-mhe_status mhi_ocp_carry_on(const mhi_ocp *ocp, mhi_ocp_worker *w, const double *x, const double *u,
-                            double *x_next, mhe_error *err) {
-    return ocp->signals.n_carried > 0 ? carry(ocp, w, x, u, x_next, NULL, NULL, err) : MHE_OK;
+mhe_status mhi_ocp_carry_on(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
+                            const double *u, double *x_next, mhe_error *err) {
+    return ocp->signals.n_carried > 0 ? carry(ocp, w, k, x, u, x_next, NULL, NULL, err) : MHE_OK;
 }
 
 void mhi_ocp_set_begins(mhi_ocp *ocp, int32_t begins) {
@@ -130,8 +129,8 @@ mhe_status mhi_ocp_carry(mhi_ocp *ocp, double *x, const double *u, mhe_error *er
     ocp->workers[0].linearised = 0;
     for (int32_t k = 0; k < ocp->face.n_intervals && ocp->n_x < n_x && status == MHE_OK; k++) {
         status =
-            carry(ocp, &ocp->workers[0], x + (ptrdiff_t)k * n_x, u + (ptrdiff_t)k * ocp->face.n_u,
-                  x + (ptrdiff_t)(k + 1) * n_x, NULL, NULL, err);
+            carry(ocp, &ocp->workers[0], k, x + (ptrdiff_t)k * n_x,
+                  u + (ptrdiff_t)k * ocp->face.n_u, x + (ptrdiff_t)(k + 1) * n_x, NULL, NULL, err);
     }
     return status;
 }

@@ -149,6 +149,9 @@ static mhe_status create_worker(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err)
         status =
             ocp->integrator->context_create(ocp->integrator_self, w->system, &w->integrator, err);
     }
+    if (status == MHE_OK) {
+        status = mhi_ocp_enter_joints(ocp, w, err);
+    }
     if (status == MHE_OK && ocp->estimated != NULL) {
         status = take_parameter_room(ocp, &ocp->arena, w, err);
     }
@@ -297,7 +300,7 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
                                         setup->tasks, &ocp->arena, &ocp->terms[i], err);
     ocp->n_terms_created = i + 1;
     if (status != MHE_OK && err != NULL && !own) {
-        const mhe_error why = *err;
+        const mhe_error why = ocp->no_signal.text[0] != '\0' ? ocp->no_signal : *err;
         err->part = MHE_PART_COST;
         err->entry = i;
         return mhe_fail(err, status, "costs.%d: %.700s", i, why.text);
@@ -307,7 +310,9 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
 
 /* What is estimated, and motions in a row. */
 static mhe_status set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
-    const uint32_t forces = 1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT;
+    const uint32_t reactions = ((1u << MHI_MAX_REACTIONS) - 1) << MHI_SIGNAL_REACTION;
+    const uint32_t forces =
+        1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT | reactions;
     mhe_status status = MHE_OK;
     ocp->node_weight = setup->node_weight;
     if (setup->parameters == NULL && setup->junctions == NULL) {

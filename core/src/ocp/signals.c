@@ -6,6 +6,7 @@
 
 #define USUAL_FORCE 500.0 /* N */
 #define USUAL_MOMENT 20.0 /* N m */
+#define AXES 3
 
 void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
     const mhe_system *f = mhi_system_face(system);
@@ -39,28 +40,50 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals) {
         }};
     for (int32_t i = 0; i < MHI_N_SIGNALS; i++) {
         mhi_signal *s = &signals->signal[i];
+        int32_t n_y = s->n_y;
+        if (i >= MHI_SIGNAL_REACTION && i <= MHI_LAST_REACTION) {
+            s->unit = "N";
+            s->reads_u = !driven || f->n_r > 0; /* these move the whole body */
+            s->n_columns = s->reads_u ? f->n_x + f->n_u : f->n_x;
+            n_y = AXES;
+        }
         s->offset = signals->n_y;
         s->scale = 1;
         s->jacobian = signals->n_jacobian;
-        signals->n_y += s->n_y;
-        signals->n_jacobian += s->n_y * s->n_columns;
+        signals->n_y += n_y;
+        signals->n_jacobian += n_y * s->n_columns;
     }
     signals->n_z = f->n_x + f->n_u;
+}
+
+int32_t mhi_signals_open_reaction(mhi_signals *signals, const char *name) {
+    for (int32_t i = MHI_SIGNAL_REACTION; i <= MHI_LAST_REACTION; i++) {
+        mhi_signal *s = &signals->signal[i];
+        if (s->n_y > 0 && strcmp(s->name, name) != 0) {
+            continue;
+        }
+        s->name = name;
+        s->n_y = AXES;
+        return i;
+    }
+    return -1;
 }
 
 int32_t mhi_signals_carry(mhi_signals *signals, int32_t i) {
     const mhi_signal *of = &signals->signal[i];
     mhi_signal *s = &signals->signal[MHI_N_SIGNALS + i];
     if (s->n_y == 0) {
-        *s = (mhi_signal){.name = of->name,
-                          .unit = of->unit,
-                          .n_y = of->n_y,
-                          .offset = signals->n_y + signals->n_carried,
-                          .column = signals->n_z + signals->n_carried,
-                          .scale = i == MHI_SIGNAL_MUSCLE_FORCE      ? USUAL_FORCE
-                                   : i == MHI_SIGNAL_JOINT_MOMENT    ? USUAL_MOMENT
-                                   : i == MHI_SIGNAL_RESIDUAL_TORQUE ? USUAL_MOMENT
-                                                                     : 1};
+        *s =
+            (mhi_signal){.name = of->name,
+                         .unit = of->unit,
+                         .n_y = of->n_y,
+                         .offset = signals->n_y + signals->n_carried,
+                         .column = signals->n_z + signals->n_carried,
+                         .scale = i == MHI_SIGNAL_MUSCLE_FORCE                         ? USUAL_FORCE
+                                  : i >= MHI_SIGNAL_REACTION && i <= MHI_LAST_REACTION ? USUAL_FORCE
+                                  : i == MHI_SIGNAL_JOINT_MOMENT    ? USUAL_MOMENT
+                                  : i == MHI_SIGNAL_RESIDUAL_TORQUE ? USUAL_MOMENT
+                                                                    : 1};
         signals->n_carried += s->n_y;
     }
     return MHI_N_SIGNALS + i;

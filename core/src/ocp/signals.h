@@ -13,6 +13,9 @@
 
 #include "model/system.h"
 
+#define MHI_MAX_REACTIONS 4
+#define MHI_REACTION "joint_reaction/" /* then the joint's name */
+
 enum {
     MHI_SIGNAL_MARKERS,
     MHI_SIGNAL_Q,
@@ -25,6 +28,8 @@ enum {
     MHI_SIGNAL_LOOP_GAP,
     MHI_SIGNAL_LOOP_RATE,
     MHI_SIGNAL_ACTUATOR,
+    MHI_SIGNAL_REACTION, /* of the first joint that a cost asks for, and so on */
+    MHI_LAST_REACTION = MHI_SIGNAL_REACTION + MHI_MAX_REACTIONS - 1,
     MHI_N_SIGNALS
 };
 
@@ -53,9 +58,14 @@ void mhi_signals_layout(const mhi_system *system, mhi_signals *signals);
 /* Signal i of the node before is carried along from now on; its row. */
 int32_t mhi_signals_carry(mhi_signals *signals, int32_t i);
 
-/* Values y [n_y] of the signals in the bit set `wanted` (1 << MHI_SIGNAL_*) at (x, u); u NULL at
- * the last node, where signals that read u become NaN. With `jacobian` [n_jacobian] also their
- * dense blocks, row-major. [hot] */
+/* What joints that costs ask for pass on: places are kept for MHI_MAX_REACTIONS of them, without a
+ * name and with n_y = 0 until they are. Row of the one named `name` (lent), which gets the next
+ * place if it has none yet; -1: all are taken. */
+int32_t mhi_signals_open_reaction(mhi_signals *signals, const char *name);
+
+/* Values y [n_y] of the signals in the bit set `wanted` (1 << MHI_SIGNAL_*), but of joints, at (x,
+ * u); u NULL at the last node, where signals that read u become NaN. With `jacobian` [n_jacobian]
+ * also their dense blocks, row-major. [hot] */
 mhe_status mhi_signals_evaluate(const mhi_signals *signals, const mhi_system *system,
                                 mhi_system_context *context, uint32_t wanted, const double *x,
                                 const double *u, double *y, double *jacobian, mhe_error *err);

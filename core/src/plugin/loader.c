@@ -87,15 +87,22 @@ static const char *link_error(const char *path) {
     return strncmp(text, path, n) == 0 && strncmp(text + n, ": ", 2) == 0 ? text + n + 2 : text;
 }
 
-/* Is that a lack of memory? The linker says it in many ways, as to a segment that it cannot map
- * without the reason, which may also be that files of that disk are not to be run. */
+/* Is that a lack of memory? The linker says it in many ways: of a file that it cannot open or of a
+ * segment that it cannot map without the reason, which of a segment may also be that files of that
+ * disk are not to be run. */
 static int is_short_of_memory(const char *path, const char *why) {
     static const char *const ways[] = {"out of memory", "cannot allocate",
-                                       "cannot map zero-fill pages", "cannot create cache"};
+                                       "cannot map zero-fill pages", "cannot create cache",
+                                       "cannot create shared object descriptor"};
+    static const char unopened[] = "cannot open shared object file";
     for (size_t i = 0; i < sizeof ways / sizeof ways[0]; i++) {
         if (strstr(why, ways[i]) != NULL) {
             return 1;
         }
+    }
+    const size_t length = strlen(why), tail = sizeof unopened - 1;
+    if (length >= tail && strcmp(why + length - tail, unopened) == 0) {
+        return 1;
     }
     struct statvfs disk;
     return strstr(why, strerror(ENOMEM)) != NULL ||

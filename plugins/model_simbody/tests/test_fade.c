@@ -153,6 +153,62 @@ static void slipping_off_is_no_jump(void **state) {
     assert_true(whole > last + 2e-3 && met > 5);
 }
 
+/* A string whose tangent point crosses the border of the side asked for turns about the cylinder:
+ * from the length one way round to that of the other, with derivatives of its own. */
+static void turning_about_is_no_jump(void **state) {
+    (void)state;
+    uint64_t seed = 59;
+    int met = 0, turned = 0;
+    double worst[2] = {0, 0}, most = 0;
+    for (int trial = 0; trial < 20000 && met < 60; trial++) {
+        scene c = random_scene(MHE_OBSTACLE_CYLINDER, &seed);
+        wrap_string string, ways[2];
+        double y[6], h[36], length;
+        jet share;
+        c.surface.side_axis = trial % 2;
+        c.surface.side_sign = trial % 4 < 2 ? 1 : -1;
+        if (solve(&c, &string) <= 0 || string.other < 0.02) {
+            continue;
+        }
+        assert_int_equal(fading(&c, &length, y, h), 1);
+        wrap_both_ways(&c.surface, c.ends, c.ends + 3, &ways[0], &ways[1], &share);
+        met++;
+        most = fmax(most, fabs(wrap_length(&ways[0]) - wrap_length(&ways[1])));
+        worst[0] = fmax(worst[0], test_jacobian_error(fading_of_ends, &c, c.ends, 6, 1, y));
+        worst[1] =
+            fmax(worst[1], test_jacobian_error(fading_gradient_of_ends, &c, c.ends, 6, 6, h));
+    }
+    print_message("%d turn, first %.1e, second %.1e, by up to %.1f mm\n", met, worst[0], worst[1],
+                  1e3 * most);
+    assert_int_equal(met, 60);
+    assert_true(most > 1e-3);
+    assert_true(worst[0] < 1e-7);
+    assert_true(worst[1] < 1e-5);
+    /* one end goes about the axis: the way round changes, and no step is a jump */
+    scene c = {.surface = {.kind = MHE_OBSTACLE_CYLINDER,
+                           .side_axis = 0,
+                           .side_sign = 1,
+                           .size = {0.01, 0.2}},
+               .ends = {-0.03, 0.001, 0, 0.04, 0, 0.005}};
+    double last = NAN;
+    int way = 0;
+    for (int k = 0; k <= 4000; k++) {
+        double angle = 3.1 + 0.55 * k / 4000;
+        wrap_string string;
+        c.ends[0] = 0.03 * cos(angle);
+        c.ends[1] = 0.03 * sin(angle);
+        double length = fading_length(&c);
+        assert_true(solve(&c, &string) > 0);
+        double about_axis = string.n[0][0] * string.t[0][1] - string.n[0][1] * string.t[0][0];
+        int now = about_axis > 0 ? 1 : -1;
+        turned += way != 0 && now != way;
+        way = now;
+        assert_true(k == 0 || fabs(length - last) < 5e-5);
+        last = length;
+    }
+    assert_int_equal(turned, 1);
+}
+
 /* Strings that are held on one side of an ellipsoid and begin to slip over: between the length of
  * the string held and that of the shortest, with derivatives of its own. */
 static void slipping_over_has_its_own_derivatives(void **state) {
@@ -199,6 +255,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(letting_go_is_no_jump),
         cmocka_unit_test(slipping_off_is_no_jump),
+        cmocka_unit_test(turning_about_is_no_jump),
         cmocka_unit_test(slipping_over_has_its_own_derivatives),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

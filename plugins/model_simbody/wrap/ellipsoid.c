@@ -223,7 +223,6 @@ static int shortest_of(const wrap_surface *surface, const double *p, const doubl
             wrap_length(&string) < shortest) {
             shortest = wrap_length(&string);
             *out = string;
-            out->held = 0;
         }
     }
     return isfinite(shortest);
@@ -350,7 +349,6 @@ int wrap_slips(const wrap_surface *surface, const double *p, const double *s,
             wrap_length(&string) < least) {
             least = wrap_length(&string);
             *pass = string;
-            pass->held = 0;
             found = 1;
         }
     }

@@ -7,71 +7,9 @@
 #include <math.h>
 #include <string.h>
 
-#define N 6        /* coordinates of both ends */
 #define CLEAR 0.02 /* of the radius */
 #define DEEP 0.1   /* of the radius */
 #define GONE 1e-5  /* of the way over which it fades: nothing that counts is left */
-
-typedef struct jet {
-    double value, slope[N], curve[N][N];
-} jet;
-
-/* f(x), of which value and derivatives are known */
-static void jet_apply(const jet *x, double value, double first, double second, jet *out) {
-    jet made = {.value = value};
-    for (int i = 0; i < N; i++) {
-        made.slope[i] = first * x->slope[i];
-        for (int j = 0; j < N; j++) {
-            made.curve[i][j] = first * x->curve[i][j] + second * x->slope[i] * x->slope[j];
-        }
-    }
-    *out = made;
-}
-
-static void jet_add(const jet *a, double scale, const jet *b, jet *out) {
-    out->value = a->value + scale * b->value;
-    for (int i = 0; i < N; i++) {
-        out->slope[i] = a->slope[i] + scale * b->slope[i];
-        for (int j = 0; j < N; j++) {
-            out->curve[i][j] = a->curve[i][j] + scale * b->curve[i][j];
-        }
-    }
-}
-
-static void jet_multiply(const jet *a, const jet *b, jet *out) {
-    jet made = {.value = a->value * b->value};
-    for (int i = 0; i < N; i++) {
-        made.slope[i] = a->value * b->slope[i] + b->value * a->slope[i];
-        for (int j = 0; j < N; j++) {
-            made.curve[i][j] = a->value * b->curve[i][j] + b->value * a->curve[i][j] +
-                               a->slope[i] * b->slope[j] + b->slope[i] * a->slope[j];
-        }
-    }
-    *out = made;
-}
-
-static void jet_divide(const jet *a, const jet *b, jet *out) {
-    double inverse = 1 / b->value;
-    jet by;
-    jet_apply(b, inverse, -inverse * inverse, 2 * inverse * inverse * inverse, &by);
-    jet_multiply(a, &by, out);
-}
-
-static void jet_root(const jet *a, jet *out) {
-    double root = sqrt(a->value);
-    jet_apply(a, root, 0.5 / root, -0.25 / (root * a->value), out);
-}
-
-static void jet_rise(const jet *x, jet *out) {
-    double v = fmax(0, fmin(1, x->value));
-    jet_apply(x, v * v * v * (10 + v * (6 * v - 15)), 30 * v * v * (1 - v) * (1 - v),
-              60 * v * (1 - v) * (1 - 2 * v), out);
-}
-
-static void jet_coordinate(const double *p, const double *s, int i, jet *out) {
-    *out = (jet){.value = i < 3 ? p[i] : s[i - 3]};
-    out->slope[i] = 1;
-}
 
 /* ---- how far it is to letting go ---- */
 
@@ -175,7 +113,7 @@ int wrap_is_off(const wrap_surface *surface, const wrap_string *string) {
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                const wrap_string *string) {
     double excess = wrap_length(string) - distance_of(p, s), off[2];
-    if (string->held) {
+    if (string->held || string->other > 0) {
         return 1;
     }
     if ((moves[0] && wrap_outside(surface, p) < FADE_INSIDE * excess) ||
@@ -199,7 +137,7 @@ static void jet_blocks(const double *pp, const double *ps, const double *ss, jet
     }
 }
 
-static void string_jet(const wrap_string *string, jet *out) {
+void wrap_jet(const wrap_string *string, jet *out) {
     double pp[9], ps[9], ss[9];
     wrap_curvature(string, pp, ps, ss);
     out->value = wrap_length(string);
@@ -278,10 +216,15 @@ static void fade_over(const wrap_surface *surface, const double *p, const double
                       const wrap_string *string, jet *length) {
     wrap_string strings[2];
     jet shortest, pass, excess, share;
-    if (!wrap_slips(surface, p, s, string, &strings[0], &strings[1])) {
+    if (string->held == WRAP_HELD_WHOLE ||
+        !wrap_slips(surface, p, s, string, &strings[0], &strings[1])) {
         return;
     }
-    string_jet(&strings[0], &shortest);
+    wrap_jet(&strings[0], &shortest);
+    if (string->held == WRAP_HELD_NOT) {
+        *length = shortest;
+        return;
+    }
     jet_add(length, -1, &shortest, &excess);
     double most = FADE_PASS * excess.value, high = wrap_length(&strings[1]) - length->value;
     if (high >= most) {
@@ -291,7 +234,7 @@ static void fade_over(const wrap_surface *surface, const double *p, const double
         *length = shortest;
         return;
     }
-    string_jet(&strings[1], &pass);
+    wrap_jet(&strings[1], &pass);
     jet_add(&pass, -1, length, &pass);
     jet_apply(&excess, most, FADE_PASS, 0, &share);
     jet_divide(&pass, &share, &share);
@@ -311,10 +254,32 @@ static void jet_out(const jet *x, double *g, double *pp, double *ps, double *ss)
     }
 }
 
+/* What is left of what the string is longer than the straight line. */
+static void fade_excess(const wrap_surface *surface, const double *p, const double *s,
+                        const int *moves, const wrap_string *string, const jet *straight,
+                        jet *excess) {
+    jet length, h;
+    double off[2];
+    wrap_jet(string, &length);
+    fade_over(surface, p, s, string, &length);
+    jet_add(&length, -1, straight, excess);
+    beyond(surface, string, off);
+    if (surface->kind == MHE_OBSTACLE_CYLINDER && off[0] > 0 && off[1] > 0) {
+        fade_off(surface, p, s, &length, excess);
+    }
+    for (int e = 0; e < 2; e++) {
+        double most = FADE_INSIDE * excess->value;
+        if (moves[e] && most > 0 && wrap_outside(surface, e ? s : p) < most) {
+            outside_jet(surface, p, s, e, &h);
+            fade_inside(&h, excess);
+        }
+    }
+}
+
 double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                   const wrap_string *string, double *g, double *pp, double *ps, double *ss) {
-    jet length, straight, excess, h;
-    double off[2], most = FADE_INSIDE * (wrap_length(string) - distance_of(p, s));
+    jet length, straight, excess;
+    double most = FADE_INSIDE * (wrap_length(string) - distance_of(p, s));
     straight_jet(p, s, &straight);
     if ((moves[0] && wrap_outside(surface, p) < GONE * most) ||
         (moves[1] &&
@@ -322,19 +287,17 @@ double wrap_faded(const wrap_surface *surface, const double *p, const double *s,
         jet_out(&straight, g, pp, ps, ss);
         return straight.value;
     }
-    string_jet(string, &length);
-    fade_over(surface, p, s, string, &length);
-    jet_add(&length, -1, &straight, &excess);
-    beyond(surface, string, off);
-    if (surface->kind == MHE_OBSTACLE_CYLINDER && off[0] > 0 && off[1] > 0) {
-        fade_off(surface, p, s, &length, &excess);
-    }
-    for (int e = 0; e < 2; e++) {
-        most = FADE_INSIDE * excess.value;
-        if (moves[e] && most > 0 && wrap_outside(surface, e ? s : p) < most) {
-            outside_jet(surface, p, s, e, &h);
-            fade_inside(&h, &excess);
-        }
+    if (string->other > 0) { /* falling + share (rising - falling) */
+        wrap_string ways[2];
+        jet share, other;
+        wrap_both_ways(surface, p, s, &ways[0], &ways[1], &share);
+        fade_excess(surface, p, s, moves, &ways[1], &straight, &excess);
+        fade_excess(surface, p, s, moves, &ways[0], &straight, &other);
+        jet_add(&other, -1, &excess, &other);
+        jet_multiply(&share, &other, &other);
+        jet_add(&excess, 1, &other, &excess);
+    } else {
+        fade_excess(surface, p, s, moves, string, &straight, &excess);
     }
     jet_add(&straight, 1, &excess, &length);
     jet_out(&length, g, pp, ps, ss);

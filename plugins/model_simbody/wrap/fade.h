@@ -12,10 +12,12 @@
  *     string of any side is shorter, by F, and
  *     the pass between both higher, by b:          E - F + F S(b / (l F))
  * so that what ends inside fades the faster the less it is; the slope does not exceed 15 / (8 k).
+ * Where the way round a cylinder turns about, both excesses fade so and their mean counts (side.h).
  * An end that stays where it is on the obstacle's body never comes in, and fades nothing. */
 #ifndef SIMBODY_FADE_H
 #define SIMBODY_FADE_H
 
+#include "side.h"
 #include "wrap.h"
 
 #define FADE_INSIDE 0.25 /* k */
@@ -30,6 +32,13 @@ int wrap_fades(const wrap_surface *surface, const double *p, const double *s, co
  * wanted. */
 double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
                   const wrap_string *string, double *g, double *pp, double *ps, double *ss);
+
+/* A string's length by its ends. */
+void wrap_jet(const wrap_string *string, jet *out);
+
+/* Strings both ways round a cylinder, and how much that of growing angles counts. */
+void wrap_both_ways(const wrap_surface *surface, const double *p, const double *s,
+                    wrap_string *rising, wrap_string *falling, jet *share);
 
 /* Distance of a point from the surface, < 0 inside; from an ellipsoid roughly, 0 where it is 0. */
 double wrap_outside(const wrap_surface *surface, const double *x);

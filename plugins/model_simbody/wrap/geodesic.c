@@ -336,6 +336,8 @@ int string_shoot(const wrap_surface *surface, const double *p, const double *s,
     double arc = start->arc, accuracy = start->near ? FINE : COARSE, step[2];
     shot now;
     int fired = 0;
+    out->held = 0;
+    out->other = 0;
     *turn = start->turn;
     if (string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now) != 0) {
         return -1;

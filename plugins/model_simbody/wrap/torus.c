@@ -228,7 +228,6 @@ int wrap_torus(const wrap_surface *surface, const double *p, const double *s,
             wrap_length(&string) < shortest && !string_cuts(surface, p, s, &string)) {
             shortest = wrap_length(&string);
             *out = string;
-            out->held = 0;
         }
     }
     return isfinite(shortest) ? needs : WRAP_UNSOLVED;

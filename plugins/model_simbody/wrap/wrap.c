@@ -14,6 +14,7 @@
 int wrap_solve(const wrap_surface *surface, const double *p, const double *s,
                const wrap_string *guess, wrap_string *out) {
     out->held = 0;
+    out->other = 0;
     switch (surface->kind) {
     case MHE_OBSTACLE_SPHERE:
         return wrap_sphere(surface, p, s, out);
@@ -154,34 +155,6 @@ int wrap_sphere(const wrap_surface *surface, const double *p, const double *s, w
 
 /* ---- cylinder ---- */
 
-/* Which way round, where the path has to pass on one side; OpenSim's rule: the tangent points that
- * lie on that side decide, those of p first. */
-static double cylinder_sense(const wrap_surface *surface, const double *distance,
-                             const double *angle) {
-    int there[2][2]; /* [end][sense of its tangent point: +, -] */
-    double open[2];
-    for (int k = 0; k < 2; k++) {
-        open[k] = acos(surface->size[0] / distance[k]);
-        for (int way = 0; way < 2; way++) {
-            double at = angle[k] + (way == 0 ? open[k] : -open[k]);
-            double along = surface->side_axis == 0 ? cos(at) : sin(at);
-            there[k][way] = surface->side_axis < 2 && sign_of(along) == surface->side_sign;
-        }
-    }
-    if (there[0][0] != there[0][1]) {
-        return there[0][0] ? 1 : -1;
-    }
-    if (there[0][0]) {
-        return there[1][0] ? -1 : 1;
-    }
-    if (there[1][0] || there[1][1]) {
-        return there[1][0] ? -1 : 1;
-    }
-    double rising = cos(angle[1] - open[1] - angle[0] - open[0]);
-    double falling = cos(angle[1] + open[1] - angle[0] + open[0]);
-    return rising < falling ? 1 : -1; /* the longer way about */
-}
-
 /* WRAP_*: whether the path between p and s touches a cylinder without end. `cross` and `along`:
  * of the plane. */
 static int cylinder_needs(const wrap_surface *surface, const double *p, const double *s) {
@@ -205,21 +178,12 @@ static int cylinder_needs(const wrap_surface *surface, const double *p, const do
     return p_there != s_there && sign_of(nearest) != sign ? WRAP_POSSIBLE : WRAP_NONE;
 }
 
-int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
+/* The string between ends outside, on the way of growing angles (sense 1) or falling ones (-1). */
+static void cylinder_string(const wrap_surface *surface, const double *p, const double *s,
+                            double sense, wrap_string *out) {
     double radius = surface->size[0];
     double distance[2] = {sqrt(p[0] * p[0] + p[1] * p[1]), sqrt(s[0] * s[0] + s[1] * s[1])};
     double angle[2] = {atan2(p[1], p[0]), atan2(s[1], s[0])};
-    if (distance[0] <= radius || distance[1] <= radius) {
-        return WRAP_INSIDE;
-    }
-    int needs = cylinder_needs(surface, p, s);
-    if (needs == WRAP_NONE) {
-        return WRAP_NONE;
-    }
-    double sense = sin(angle[1] - angle[0]) < 0 ? -1 : 1; /* the short way */
-    if (surface->side_axis == 0 || surface->side_axis == 1) {
-        sense = cylinder_sense(surface, distance, angle);
-    }
     circle_string ring;
     circle_tangents(radius, distance, angle, sense, &ring);
     /* unrolled, the string is one straight line */
@@ -245,5 +209,45 @@ int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
     out->field[0] = out->field[3] = 1;
     out->field[1] = 0;
     out->field[2] = out->arc;
+}
+
+void wrap_both_ways(const wrap_surface *surface, const double *p, const double *s,
+                    wrap_string *rising, wrap_string *falling, jet *share) {
+    jet lengths[2];
+    rising->held = falling->held = 0;
+    rising->other = falling->other = 0;
+    cylinder_string(surface, p, s, 1, rising);
+    cylinder_string(surface, p, s, -1, falling);
+    wrap_jet(rising, &lengths[0]);
+    wrap_jet(falling, &lengths[1]);
+    side_rising_jet(surface, p, s, &lengths[0], &lengths[1], share);
+}
+
+int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
+    double square = surface->size[0] * surface->size[0];
+    if (p[0] * p[0] + p[1] * p[1] <= square || s[0] * s[0] + s[1] * s[1] <= square) {
+        return WRAP_INSIDE;
+    }
+    int needs = cylinder_needs(surface, p, s), between = 0;
+    if (needs == WRAP_NONE) {
+        return WRAP_NONE;
+    }
+    double rising = p[0] * s[1] - p[1] * s[0] < 0 ? 0 : 1; /* the short way */
+    if (surface->side_axis == 0 || surface->side_axis == 1) {
+        rising = side_rising(surface, p, s, &between);
+    }
+    if (between) {
+        wrap_string falling;
+        jet share;
+        wrap_both_ways(surface, p, s, out, &falling, &share);
+        int off[2] = {wrap_is_off(surface, &falling), wrap_is_off(surface, out)};
+        int way = share.value > 0.5;
+        if (!way) {
+            *out = falling;
+        }
+        out->other = fmin(share.value, 1 - share.value);
+        return off[way] && (out->other == 0 || off[1 - way]) ? WRAP_NONE : needs;
+    }
+    cylinder_string(surface, p, s, rising > 0.5 ? 1 : -1, out);
     return wrap_is_off(surface, out) ? WRAP_NONE : needs;
 }

@@ -29,8 +29,13 @@ typedef struct wrap_string {
     double straight[2];      /* d1, d2 */
     double arc;              /* length on the surface */
     double field[4];         /* j, j' at b of (1, 0) at a; of (0, 1) at a */
-    int32_t held;            /* a shorter one may lie on the other side than asked for */
+    int32_t held;            /* WRAP_HELD: a shorter one may lie on the other side than asked for */
+    double other;            /* how much the other way round a cylinder counts, 0 .. 0.5 */
 } wrap_string;
+
+#define WRAP_HELD 1
+#define WRAP_HELD_WHOLE 2 /* by however low a pass */
+#define WRAP_HELD_NOT 3   /* by no pass: the shortest string counts instead */
 
 #define WRAP_INSIDE (-1)   /* an end is inside: no wrap */
 #define WRAP_NONE 0        /* the straight line is free */
