@@ -59,6 +59,8 @@ int32_t live_wait(live *l, mhe_estimator *estimator, const double *time, int32_t
     l->next = k + 1;
     l->arrived = l->begin + time[k] - time[0];
     l->jitter[l->n_jitter++] = now - l->arrived;
+    const double left = l->deadline - (now - l->arrived);
+    (void)mhe_estimator_set_deadline(estimator, left > l->least ? left : l->least, NULL);
     return k;
 }
 

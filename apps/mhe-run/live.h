@@ -12,9 +12,11 @@
 typedef struct live {
     double begin;    /* of the clock, when the first frame came */
     double deadline; /* from a frame to its estimate */
+    double least;    /* of it, for a frame that has waited: what lets it catch up */
     int32_t next;    /* frame to wait for */
     int32_t kept;    /* frames that wait while an estimate is made, as in a device's buffer: those
-                      * from one estimate to the next; 0 is taken as 1 */
+                      * from one estimate to the next, and those of the time to a deadline that is
+                      * longer; 0 is taken as 1 */
     int32_t n_missed;
     int32_t has_priority; /* real-time priority, its own or given: other programs do not delay it */
     int32_t raised;       /* its own */

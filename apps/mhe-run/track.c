@@ -9,6 +9,7 @@
 #include "summary.h"
 #include "understood.h"
 
+#include <math.h>
 #include <mhe/library.h>
 #include <string.h>
 #include <time.h>
@@ -39,9 +40,11 @@ static double number(const tracking *t, const char *key) {
 static mhe_status open_live(tracking *t, mhe_error *err) {
     const mhe_estimator_info *info = &t->summary.info;
     const double deadline = 1e-3 * number(t, "realtime.deadline_ms");
-    t->live.deadline =
-        deadline > 0 ? deadline : LIVE_SHARE * info->ratio / t->summary.recording.rate;
-    t->live.kept = info->ratio;
+    const double share = LIVE_SHARE * info->ratio / t->summary.recording.rate;
+    t->live.deadline = deadline > 0 ? deadline : share;
+    t->live.least = fmin(t->live.deadline, share);
+    const double waiting = ceil(t->live.deadline * t->summary.recording.rate);
+    t->live.kept = waiting > info->ratio ? (int32_t)fmin(waiting, INT32_MAX) : info->ratio;
     char *node = NULL;
     mhe_status status = mhe_estimator_set_deadline(t->estimator, t->live.deadline, err);
     if (status == MHE_OK) {

@@ -6,7 +6,7 @@
 #include <string.h>
 
 #define AT_BOUND 1e-5   /* so near to a bound ... */
-#define MULTIPLIER 1e-4 /* ... that presses so hard a variable is none */
+#define MULTIPLIER 1e-5 /* ... that presses so hard a variable is none */
 
 static ptrdiff_t place(const mhi_dense *d, int32_t row, int32_t column) {
     return (ptrdiff_t)row * d->n + column;

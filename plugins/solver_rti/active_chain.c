@@ -26,6 +26,11 @@ static ptrdiff_t e_at(const chain *c, int32_t k) {
     return (ptrdiff_t)k * c->q->shape->ld_z + c->u;
 }
 
+/* The simple state of stage k is a variable. */
+static int32_t is_free(const chain *c, int32_t k) {
+    return k > 0 || !c->q->fixed[(ptrdiff_t)c->q->shape->n_u + c->x];
+}
+
 static ptrdiff_t a_at(const chain *c, int32_t k) {
     return (ptrdiff_t)k * c->q->shape->ld_z + c->q->shape->n_u + c->x;
 }
@@ -77,7 +82,7 @@ static void sweep_back(const chain *c) {
                 s += alpha * t - c->K[k] * slope;
             }
         }
-        const int32_t held = k > 0 && q->side[a] != 0;
+        const int32_t held = is_free(c, k) && q->side[a] != 0;
         c->p[k] = p + (held ? ACTIVE_HOLD : 0);
         c->s[k] = s - (held ? ACTIVE_HOLD * active_bound(q, a) : 0);
     }
@@ -85,7 +90,7 @@ static void sweep_back(const chain *c) {
 
 static void sweep_forward(const chain *c) {
     const qp *q = c->q;
-    c->a[0] = q->w[a_at(c, 0)];
+    c->a[0] = is_free(c, 0) ? -c->s[0] / c->p[0] : q->w[a_at(c, 0)];
     for (int32_t k = 0; k < q->shape->N; k++) {
         const qp_stage *stage = &q->stages[k];
         c->e[k] = c->v[k] - c->K[k] * c->a[k];
@@ -107,7 +112,7 @@ static int32_t update(const chain *c, double crossed, double pulled) {
                              q->stages[k].by_control[c->x] * multiplier;
             changes += active_turn(q, e, c->e[k], y, crossed, pulled);
         }
-        if (k > 0) {
+        if (is_free(c, k)) {
             const int32_t held = q->side[a] != 0;
             const double y = held ? -ACTIVE_HOLD * (c->a[k] - active_bound(q, a)) : 0;
             multiplier = y - curvature(q, a) * c->a[k] - c->pull_a[k] +

@@ -97,9 +97,10 @@ static ptrdiff_t first_control(const kalman *f) {
     return f->m > 0 ? f->shape->control_of[f->n] : 0;
 }
 
-void kalman_begin(kalman *f, const qp_stage *stages) {
+void kalman_begin(kalman *f, const qp_stage *stages, int32_t free) {
     const qp_shape *s = f->shape;
     f->known = 0;
+    f->free = free;
     for (int32_t k = 0; k <= s->N; k++) {
         double *h = row_z(s, f->h, k);
         for (int32_t i = 0; i < s->n_z; i++) {
@@ -166,7 +167,39 @@ static void close_loop(kalman *f, int32_t k) {
     }
 }
 
-/* Sigma of the next node from Sigma' of node k; that of the first is 0. */
+/* Sigma' of a first node that is a variable; 0: its cost is not positive definite. */
+static int32_t begin_free(kalman *f, const qp_stage *stage, const double *diagonal) {
+    const qp_shape *s = f->shape;
+    const int32_t n = f->n, ld_w = f->ld_w;
+    const double *p = simple_x(f, f->p, 0);
+    const uint8_t *held = f->held + s->n_u;
+    double *W = kalman_W_of(f, 0); /* [Q, I], without what is held */
+    memset(W, 0, sizeof(double) * (size_t)(n * ld_w));
+    for (int32_t i = 0; i < n; i++) {
+        const double *from = stage->H + (s->n_u + i) * s->ld_z + s->n_u;
+        for (int32_t j = i; j < n; j++) {
+            W[i * ld_w + j] = held[i] || held[j] ? 0 : from[j];
+        }
+        W[i * (ld_w + 1)] = held[i] ? 1 : from[i] + diagonal[s->n_u + i];
+        W[i * (ld_w + 1) + n] = !held[i];
+    }
+    if (!s->kernels->factor(n, 2 * n, W, ld_w, kalman_of_d(f, f->W_inverse, 0))) {
+        return 0;
+    }
+    memset(f->after, 0, sizeof(double) * (size_t)(s->n_x * s->ld_x));
+    s->kernels->product(n, n, n, 1, W + n, ld_w, W + n, ld_w, NULL, f->after, s->ld_x, 1);
+    s->kernels->mirror(n, f->after, s->ld_x);
+    memcpy(kalman_D_of(f, 0), f->after, sizeof(double) * (size_t)(n * s->ld_x));
+    for (int32_t j = 0; j < f->m; j++) {
+        if (!held[n + j] && !(p[j] > 0)) {
+            return 0;
+        }
+        f->after[(n + j) * (s->ld_x + 1)] = held[n + j] ? 0 : 1 / p[j];
+    }
+    return 1;
+}
+
+/* Sigma of the next node from Sigma' of node k; that of a first one that is fixed is 0. */
 static void predict(kalman *f, const qp_stage *stage, int32_t k) {
     const qp_shape *s = f->shape;
     const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_d = f->ld_d;
@@ -174,16 +207,17 @@ static void predict(kalman *f, const qp_stage *stage, int32_t k) {
     const double *beta = stage->by_control + n;
     const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z + first_control(f);
     const double *of_control = f->noise + first_control(f) * ld_d;
+    const int32_t spread = k > 0 || f->free;
     double *next = f->before;
     s->kernels->product(n, n, s->n_u, 1, FT, ld_d, f->noise, ld_d, NULL, next, ld_x, 1);
-    if (k > 0) {
+    if (spread) {
         s->kernels->product(n_x, n, n_x, 1, f->after, ld_x, C, ld_d, NULL, f->T, ld_d, 0);
         s->kernels->product(n, n, n_x, 1, C, ld_d, f->T, ld_d, next, next, ld_x, 1);
     }
     for (int32_t j = 0; j < f->m; j++) {
         double *row = next + (n + j) * ld_x;
         const double *t = f->T + (n + j) * ld_d, *e = of_control + j * ld_d;
-        const double by_t = k > 0 ? closed[j] : 0, by_e = beta[j];
+        const double by_t = spread ? closed[j] : 0, by_e = beta[j];
         for (int32_t i = 0; i < n; i++) {
             row[i] = by_t * t[i] + by_e * e[i];
         }
@@ -216,7 +250,7 @@ static int32_t first_changed(kalman *f, const double *diagonal) {
     for (int32_t k = f->shape->N - 1; k >= 0; k--) {
         first = is_kept(f, diagonal, k) ? first : k;
     }
-    return f->m == 0 ? first : 0;
+    return f->m == 0 && !f->free ? first : 0;
 }
 
 int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
@@ -238,6 +272,9 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
     f->known = 0;
     if (first > 0 && first < s->N) {
         memcpy(f->after, kalman_D_of(f, first), sizeof(double) * (size_t)(f->n * s->ld_x));
+    }
+    if (f->free && !begin_free(f, &stages[0], diagonal)) {
+        return 0;
     }
     for (int32_t k = first; k < s->N; k++) {
         close_loop(f, k);
@@ -279,23 +316,40 @@ static void sweep_simple(kalman *f, const qp_stage *stages, const double *g, con
     }
 }
 
-/* Means: z and what of x no pull has changed, behind each measurement. */
+/* Mean of a free first state: simple states at the least of their costs to go. */
+static void begin_mean(kalman *f, const double *g) {
+    const qp_shape *s = f->shape;
+    const double *D = kalman_D_of(f, 0);
+    for (int32_t i = 0; i < s->n_x; i++) {
+        double mean = 0;
+        for (int32_t j = 0; j < f->n && i < f->n; j++) {
+            mean -= D[i * s->ld_x + j] * g[s->n_u + j];
+        }
+        f->x[i] = i < f->n ? mean : f->held[s->n_u + i] ? 0 : -f->s[i] / f->p[i];
+    }
+}
+
+/* Means behind each measurement. */
 static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, const double *b) {
     const qp_shape *s = f->shape;
     const int32_t n = f->n, ld_d = f->ld_d;
     const ptrdiff_t u = first_control(f);
+    if (f->free) {
+        begin_mean(f, g);
+    }
     for (int32_t k = 0; k < s->N; k++) {
+        const int32_t moves = k > 0 || f->free;
         const double *beta = stages[k].by_control + n, *closed = simple_x(f, f->closed, k);
         const double *v = f->v + (ptrdiff_t)k * s->ld_z, *x = f->x + (ptrdiff_t)k * s->ld_x;
         double *y = f->row, *m = f->next, *z = kalman_of_d(f, f->z, k + 1);
         memcpy(m, b + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)s->ld_x);
         for (int32_t j = 0; j < f->m; j++) {
-            m[n + j] += beta[j] * v[u + j] + (k > 0 ? closed[j] * x[n + j] : 0);
+            m[n + j] += beta[j] * v[u + j] + (moves ? closed[j] * x[n + j] : 0);
         }
         memset(z, 0, sizeof(double) * (size_t)ld_d);
         memcpy(z, m, sizeof(double) * (size_t)n);
         s->kernels->add_transposed(s->n_u, n, 1, FT_of(f, k), ld_d, v, z);
-        if (k > 0) {
+        if (moves) {
             s->kernels->add_transposed(s->n_x, n, 1, C_of(f, k), ld_d, x, z);
         }
         memcpy(m, z, sizeof(double) * (size_t)n);
@@ -353,7 +407,12 @@ static void sweep_back(kalman *f, const qp_stage *stages, double *w, double *lam
             f->eta[n + j] = closed[j] * out[n + j];
         }
         memset(f->eta, 0, sizeof(double) * (size_t)n);
-        s->kernels->add(k > 1 ? n_x : 0, n, 1, C_of(f, k - 1), ld_d, f->lambda, f->eta);
+        s->kernels->add(k > 1 || f->free ? n_x : 0, n, 1, C_of(f, k - 1), ld_d, f->lambda, f->eta);
+    }
+    if (f->free) {
+        double *x = row_z(s, w, 0) + s->n_u;
+        memcpy(x, f->x, sizeof(double) * (size_t)n);
+        s->kernels->add(n, n_x, 1, kalman_D_of(f, 0), s->ld_x, f->eta, x);
     }
 }
 
@@ -362,7 +421,11 @@ static void follow_simple(kalman *f, const qp_stage *stages, const double *b, do
                           double *lambda) {
     const qp_shape *s = f->shape;
     const ptrdiff_t u = first_control(f), a = s->n_u + f->n;
-    memset(row_z(s, w, 0) + s->n_u, 0, sizeof(double) * (size_t)s->n_x);
+    double *first = row_z(s, w, 0) + s->n_u;
+    for (int32_t i = f->free ? f->n : 0; i < s->n_x; i++) { /* the pull of the others on each */
+        const int32_t held = !f->free || f->held[s->n_u + i];
+        first[i] = held ? 0 : (f->eta[i] - f->s[i]) / f->p[i];
+    }
     for (int32_t k = 0; k < s->N; k++) {
         const double *alpha = stages[k].by_state + f->n, *beta = stages[k].by_control + f->n;
         const double *K = simple_x(f, f->K, k), *c = simple_x(f, b, k);

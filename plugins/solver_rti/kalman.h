@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* kalman.h: the Newton system of a separable program by a recursion forwards, on covariances.
  *
- * Where controls and simple states (activations) have diagonal costs and the first state is fixed,
- * all that ties muscles together is what they do to the dense states. So controls are eliminated
- * one by one and no matrix of their size is factorised:
+ * Where controls and simple states (activations) have diagonal costs, all that ties muscles
+ * together is what they do to the dense states. So controls are eliminated one by one and no matrix
+ * of their size is factorised:
  *
  * 1. Each simple state with its control is a scalar problem of its own. Completing its square
  *    backwards (a scalar Riccati recursion) takes the cost off the state: e = e' - K a, with
@@ -14,6 +14,9 @@
  *    is the cost of the dense states:
  *        Sigma+ = F Sigma' F^T + B R'^-1 B^T,   Sigma' = (I + Sigma Q)^-1 Sigma
  * 3. Multipliers and controls follow backwards (a smoother in the form of Bryson and Frazier 1963).
+ *
+ * A free first state has the covariance that its own cost leaves it: of a dense one the inverse of
+ * that cost, of a simple one that of its cost to go.
  *
  * A stage costs n_x^2 n_dense instead of n_z^2 n_dense and a factorisation of n_u rows: two to
  * three times less where muscles have activations, five to ten where they are the controls. A
@@ -26,7 +29,8 @@
 
 typedef struct kalman {
     const qp_shape *shape;
-    const uint8_t *held; /* [size_z] of the last factorisation: controls that are constants */
+    const uint8_t *held; /* [size_z] of the last factorisation: constants */
+    int32_t free;        /* the first state is a variable */
     int32_t n, m;        /* dense and simple states */
     int32_t known;       /* stages that the last factorisation of this program got through */
     int32_t ld_d, ld_w;
@@ -52,9 +56,10 @@ typedef struct kalman {
 int32_t kalman_takes(const qp_shape *s);
 size_t kalman_size(const qp_shape *s); /* doubles */
 void kalman_place(kalman *f, const qp_shape *s, double *memory);
-/* Before the first factorisation of a program. */
-void kalman_begin(kalman *f, const qp_stage *stages);
-/* As riccati_factor() and riccati_solve(); `held` [size_z] are controls that are 0. Where all
+/* Before the first factorisation of a program; `free`: its first state is a variable. */
+void kalman_begin(kalman *f, const qp_stage *stages, int32_t free);
+/* As riccati_factor() and riccati_solve(); `held` [size_z] are controls, and of a free first state
+ * what of it, that are 0. Where all
  * states are dense, what has not changed since the last factorisation of the program, from the
  * first stage on, stays: sets differ in a few places. */
 int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,

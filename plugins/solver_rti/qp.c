@@ -74,7 +74,7 @@ void qp_use(qp *q, int32_t recursion) {
 }
 
 int32_t qp_best(const qp *q) {
-    return kalman_takes(q->shape) && q->first_is_fixed ? QP_KALMAN : QP_RICCATI;
+    return kalman_takes(q->shape) ? QP_KALMAN : QP_RICCATI;
 }
 
 int32_t qp_take_work(qp *q) {
@@ -136,14 +136,16 @@ int32_t qp_solve(qp *q, const qp_stage *stages, const qp_limits *limits, int32_t
     q->stages = stages;
     qp_use(q, qp_best(q));
     if (q->recursion == QP_KALMAN) {
-        kalman_begin(&q->kalman, stages);
+        kalman_begin(&q->kalman, stages, !q->first_is_fixed);
     }
     if (s->n_p > 0) {
         border_begin(q);
     }
     q->programs++;
     q->solutions += BEGIN;
-    if (s->n_p == 0 && (!warm || !q->first_is_fixed || q->skipped < q->to_skip)) {
+    const int32_t by_sets =
+        q->first_is_fixed ? warm : q->recursion == QP_KALMAN; /* from none, at first */
+    if (s->n_p == 0 && (!by_sets || q->skipped < q->to_skip)) {
         q->skipped++;
         return inside_solve(q, limits, warm);
     }

@@ -115,7 +115,7 @@ int32_t qp_factor(qp *q, const uint8_t *held);
 /* In solutions, since it was last asked. */
 int32_t qp_take_work(qp *q);
 void qp_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
-/* Where the first state is fixed and costs allow it: on covariances. */
+/* Where costs allow it: on covariances. */
 int32_t qp_best(const qp *q);
 
 /* active.c: the program by a primal-dual active set, from the bounds at which the multipliers

@@ -84,6 +84,7 @@ typedef struct rti_solver {
     double penalty;                   /* the largest of them */
     double damping;                   /* Levenberg's, of the next step */
     int32_t warm;                     /* the multipliers are worth a start */
+    int32_t real_time;                /* this solve goes by full steps */
     double gap_sum;                   /* at `here` */
     rti_residuals residuals;          /* at the last linearisation */
     double least_excess;              /* of the points of this solve, see rti_excess() */
@@ -91,6 +92,7 @@ typedef struct rti_solver {
     double deadline;                  /* this solve's; infinity: none */
     const mhe_solve_control *control; /* this solve's, or NULL */
     double iteration_time;            /* s, of this solve's last iteration */
+    double full_time, leap_time;      /* s, of the last real-time ones of each kind, of any solve */
     double seconds;                   /* spent in evaluate() */
     mhe_status failure;               /* negative status of evaluate() */
     mhe_error *err;                   /* the caller's, for its text */

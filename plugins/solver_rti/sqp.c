@@ -143,8 +143,9 @@ static int32_t verdict(rti_solver *s, const mhe_solve_control *control, int32_t 
     if (iteration >= limit) {
         return MHE_SOLVE_ITERATION_LIMIT;
     }
-    /* The next iteration will take about as long as the last one. */
-    if (rti_is_late(s, s->iteration_time) || rti_is_spent(s)) {
+    /* The next iteration will take about as long as the last one; a real-time one may be a leap. */
+    const double takes = s->real_time && iteration > 0 ? s->leap_time : s->iteration_time;
+    if (rti_is_late(s, takes) || rti_is_spent(s)) {
         return MHE_SOLVE_DEADLINE;
     }
     return -1;
@@ -173,14 +174,30 @@ static void write_multipliers(rti_solver *s, mhe_solution *out) {
     out->has_multipliers = 1;
 }
 
-static double largest_gap(rti_solver *s) {
+/* Of the first `n` intervals. */
+static double largest_gap(rti_solver *s, int32_t n) {
     double largest = 0;
-    for (int32_t k = 0; k < s->shape.N; k++) {
+    for (int32_t k = 0; k < n; k++) {
         for (int32_t i = 0; i < s->shape.n_x; i++) {
             largest = larger(largest, fabs(s->here.stages[k].b[i]));
         }
     }
     return largest;
+}
+
+/* Full steps need a start near the solution: multipliers and a given first state. */
+static int32_t is_near(const rti_solver *s) {
+    return s->warm && s->qp.first_is_fixed;
+}
+
+static int32_t one_step(const rti_solver *s) {
+    const mhe_solve_control *c = s->control;
+    return c != NULL && c->size > offsetof(mhe_solve_control, one_step) && c->one_step;
+}
+
+/* Any other window is solved as by `robust`. */
+static int32_t is_real_time(const rti_solver *s) {
+    return one_step(s) || (s->config->preset != RTI_ROBUST && is_near(s));
 }
 
 static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info) {
@@ -191,23 +208,18 @@ static void write_result(rti_solver *s, mhe_solution *out, mhe_solve_info *info)
     s->has_result = 1;
     info->objective = (leap->taken ? leap->cost : s->here.cost) / s->scale;
     info->kkt_residual = worst(&s->residuals);
-    info->primal_residual = leap->taken ? fmax(leap->first_gap, leap->left) : largest_gap(s);
-}
-
-/* Full steps need a start near the solution: multipliers and a given first state. */
-static int32_t is_near(const rti_solver *s) {
-    return s->warm && s->qp.first_is_fixed;
-}
-
-/* Any other window is solved as by `robust`. */
-static int32_t is_real_time(const rti_solver *s) {
-    return s->config->preset != RTI_ROBUST && is_near(s);
+    const int32_t stepped = s->real_time && info->iterations > 0;
+    /* A real-time iteration cut between steps is judged as one that ended with a leap. */
+    info->primal_residual =
+        leap->taken ? fmax(leap->first_gap, leap->left) : largest_gap(s, stepped ? 1 : s->shape.N);
 }
 
 static int32_t iteration_limit(const rti_solver *s) {
     static const int32_t most[] = {[RTI_SPEED] = 1, [RTI_BALANCED] = 3};
     const int32_t given = s->config->max_iterations;
-    return is_real_time(s) && most[s->config->preset] < given ? most[s->config->preset] : given;
+    return one_step(s)                                          ? 1
+           : is_real_time(s) && most[s->config->preset] < given ? most[s->config->preset]
+                                                                : given;
 }
 
 /* What a leap came to. It is not measured again, so converged means what can be said of the node
@@ -232,6 +244,7 @@ static void tell_progress(const rti_solver *s, const mhe_solve_control *control,
 /* From the evaluated start; gives MHE_SOLVE_*. */
 static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t *iterations) {
     const int32_t limit = iteration_limit(s), near = is_near(s), real_time = is_real_time(s);
+    s->real_time = real_time;
     s->penalty = s->damping = 0;
     memset(s->weight, 0, sizeof(double) * size_x(&s->shape));
     s->least_excess = INFINITY;
@@ -242,11 +255,13 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
             return outcome;
         }
         const double begin = rti_now();
-        const int32_t last = real_time && *iterations + 1 == limit;
+        const int32_t whole = *iterations + 1 == limit; /* else it leaps for want of time */
+        const int32_t last = real_time && (whole || rti_is_late(s, s->full_time));
         const int32_t result = last        ? rti_leap_on(s)
                                : real_time ? rti_step_full(s)
                                            : rti_step_globalised(s, near && *iterations == 0);
         s->iteration_time = rti_now() - begin;
+        *(last ? &s->leap_time : &s->full_time) = s->iteration_time;
         if (result == RTI_STUCK) {
             return MHE_SOLVE_FAILED;
         }
@@ -260,7 +275,8 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
         }
         if (last || result == RTI_CUT) {
             tell_progress(s, control, *iterations);
-            return result == RTI_CUT ? MHE_SOLVE_DEADLINE : judge(s);
+            const int32_t came_to = result == RTI_CUT ? MHE_SOLVE_DEADLINE : judge(s);
+            return came_to == MHE_SOLVE_CONVERGED || whole ? came_to : MHE_SOLVE_DEADLINE;
         }
     }
 }
@@ -309,7 +325,7 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
     if (rti_is_late(s, 0)) { /* at once */
         s->control = NULL;
         info->outcome = MHE_SOLVE_DEADLINE;
-        info->primal_residual = s->prepared ? largest_gap(s) : INFINITY;
+        info->primal_residual = s->prepared ? largest_gap(s, s->shape.N) : INFINITY;
         return MHE_OK;
     }
     const int32_t programs = s->qp.programs, fallbacks = s->qp.fallbacks;

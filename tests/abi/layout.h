@@ -684,7 +684,7 @@ AT(mhe_covariance, pp, 32);
 AT(mhe_covariance, px, 40);
 AT(mhe_covariance, pu, 48);
 
-SIZE(mhe_solve_control, 56);
+SIZE(mhe_solve_control, 64);
 AT(mhe_solve_control, size, 0);
 AT(mhe_solve_control, deadline, 8);
 AT(mhe_solve_control, data, 16);
@@ -692,6 +692,7 @@ AT(mhe_solve_control, progress, 24);
 AT(mhe_solve_control, budget, 32);
 AT(mhe_solve_control, spent, 40);
 AT(mhe_solve_control, late, 48);
+AT(mhe_solve_control, one_step, 56);
 
 SIZE(mhe_solve_info, 56);
 AT(mhe_solve_info, size, 0);

@@ -13,15 +13,15 @@ awk -F'[<>"]' '/Muscle name=/ { name = $3 } /<max_isometric_force>/ && name != "
     "$arm/arm19.osim" > strength.txt
 [ "$(wc -l < strength.txt)" -eq 19 ] || fail "$(wc -l < strength.txt) muscles in arm19.osim"
 
-# worst FORCES TRUTH: the largest RMS error of a muscle in F_max, and whose, from 0.03 s on: before, no measurement says
-# where the activations come from.
+# worst FORCES TRUTH: the largest RMS error of a muscle in F_max, and whose, from 0.06 s on: before, no measurement says
+# where the activations come from, and those that the simulation begins with die away in about that time.
 worst() {
     awk 'FILENAME == "strength.txt" { strength[$1] = $2; next }
          FNR == 1 { file++; data = 0 }
          $1 == "time" { data = 1; for (i in column) { if (index(i, file ":") == 1) delete column[i] }
              for (i = 2; i <= NF; i++) { name = $i; if (sub(/^F_/, "", name) || file == 2) { column[file ":" name] = i } } next }
          data && file == 1 { for (m in strength) truth[$1 ":" m] = $column["1:" m] }
-         data && file == 2 && $1 >= 0.03 && ($1 ":BRA") in truth { rows++
+         data && file == 2 && $1 >= 0.06 && ($1 ":BRA") in truth { rows++
              for (m in strength) { d = ($column["2:" m] - truth[$1 ":" m]) / strength[m]; sum[m] += d * d } }
          END { for (m in sum) { rms = sqrt(sum[m] / rows); if (rms >= most) { most = rms; of = m } }
              print (rows > 15 ? most : "rows=" rows + 0), of }' strength.txt "$2" "$1"

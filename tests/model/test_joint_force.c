@@ -81,6 +81,7 @@ static void matches_reactions(rig *r, const char *joint, const double *z) {
                                     .model = r->f.run->model.plugin,
                                     .model_config = r->f.run->model.config};
     mhi_reactions *all = NULL;
+    int compared = 0;
     double force[3], *out = calloc((size_t)(6 * d->n_bodies), sizeof *out);
     mhe_system_point at;
     mhi_system_point(r->f.system, z, z + r->face->n_x, r->w, &at);
@@ -90,10 +91,15 @@ static void matches_reactions(rig *r, const char *joint, const double *z) {
         MHE_OK);
     assert_int_equal(value(r, z, force), 0);
     for (int32_t i = 0; i < d->n_bodies; i++) {
-        for (int32_t k = 0; k < 3 && strcmp(d->bodies[i].name, joint) == 0; k++) {
+        for (int32_t k = 0; k < 3 && (strcmp(d->bodies[i].name, joint) == 0 ||
+                                      (d->joints != NULL && d->joints[i] != NULL &&
+                                       strcmp(d->joints[i], joint) == 0));
+             k++) {
             assert_true(fabs(out[6 * i + k] - force[k]) < 1e-8 * (1 + fabs(force[k])));
+            compared++;
         }
     }
+    assert_int_equal(compared, 3);
     mhi_reactions_free(all);
     free(out);
 }
@@ -115,7 +121,7 @@ static void check(const char *yaml, const char *joint, int compare) {
         const double error = test_jacobian_error(value, &r, z, r.width, 3, by_z);
         worst = error >= 0 && error < worst ? worst : error;
         assert_true(fabs(force[0]) + fabs(force[1]) + fabs(force[2]) > 1);
-        if (compare) {
+        if (compare && trial == 0) {
             matches_reactions(&r, joint, z);
         }
     }
@@ -146,7 +152,7 @@ static void of_a_shoulder_with_a_loop(void **state) {
                    "model: {file: %s}\nmuscle: {curves: degroote2016, passive: 0}\n"
                    "formulation: activation\nbounds: {residual_torques: true}\n" COSTS,
                    path);
-    check(yaml, "GlenoHumeral", 0);
+    check(yaml, "GlenoHumeral", 1);
 }
 
 static void refuses(const char *yaml, const char *joint, const char *says) {

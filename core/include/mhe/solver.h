@@ -135,6 +135,9 @@ typedef struct mhe_solve_control {
      * clock (a replay answers what was answered once, whatever the clock says), on the thread that
      * called solve() and not while evaluate() runs. May be NULL. */
     int32_t (*late)(void *budget, double seconds);
+    /* Not 0: one iteration, from a start that may be far, however the solver would go on: there is
+     * no time for more, and the next solve continues from its result. */
+    int32_t one_step;
 } mhe_solve_control;
 
 typedef struct mhe_solve_info {

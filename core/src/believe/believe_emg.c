@@ -20,6 +20,7 @@
 #define FLAT_SHARE 0.02 /* of the recording */
 #define REST 0.02       /* of the MVC: a muscle at rest, as far as forces are concerned */
 #define REST_SHARE 0.05 /* of the samples; people rest each muscle for longer in a recording */
+#define REST_TIME 1.0   /* s: in a shorter recording they may not */
 #define REST_CHANNELS 3 /* of so many and more one rests at times */
 #define MANY 6          /* of so many and more one rests nearly always; else ... */
 #define TENSE 0.25      /* ... in that share of the frames all have something in common */
@@ -98,12 +99,42 @@ static double tense_share(const mhi_recording *r, int32_t n_m) {
     return n == 0 ? 0 : (double)n_tense / n;
 }
 
+/* What adds to all channels is at once in all of them, and leaves none at rest. */
+static void check_rest(const char *path, const mhe_description *d, const mhi_recording *r,
+                       const channel *all, mhi_findings *findings) {
+    int32_t n_there = 0, n_restless = 0;
+    double least = INFINITY;
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        n_there += all[i].n > 0;
+        n_restless += all[i].n > 0 && all[i].n_rest < REST_SHARE * all[i].n;
+        least = fmin(least, all[i].low);
+    }
+    const double tense = tense_share(r, d->n_muscles);
+    if (r->n_frames < REST_TIME * r->rate) {
+        return;
+    }
+    if (n_there >= REST_CHANNELS && n_restless == n_there) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an offset, mains hum or noise that was not taken off? Take off what each "
+                         "channel shows at rest: it moves all forces up",
+                         "%s: none of %d muscles is ever at rest (below %.0f %% of its MVC; the "
+                         "least is %.0f %%)",
+                         path, n_there, 100 * REST, 100 * least);
+    } else if (n_there >= MANY && tense > TENSE) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an artefact that all channels have in common, hum, or a clock? High-pass "
+                         "raw EMG (20 Hz) before its envelope is made",
+                         "%s: all of %d muscles are active at once (above %.0f %% of the MVC) in "
+                         "%.0f %% of the frames",
+                         path, n_there, 100 * REST, 100 * tense);
+    }
+}
+
 /* One list of muscles a kind. */
 static void check_channels(const char *path, const mhe_description *d, const mhi_recording *r,
                            const channel *all, mhi_findings *findings) {
     mhi_text flat = {0}, zero = {0}, own = {0}, below = {0}, beyond = {0};
-    int32_t n_own = 0, n_there = 0, n_quiet = 0, n_restless = 0;
-    double least = INFINITY;
+    int32_t n_own = 0, n_there = 0, n_quiet = 0;
     for (int32_t i = 0; i < d->n_muscles; i++) {
         const channel *c = &all[i];
         if (c->n == 0) {
@@ -111,8 +142,6 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
         }
         n_there++;
         n_quiet += c->high < QUIET;
-        n_restless += c->n_rest < REST_SHARE * c->n;
-        least = fmin(least, c->low);
         if (c->high == 0 && c->low == 0) {
             add_name(&zero, d->muscles[i].name);
         } else if (c->n_flat > FLAT_SHARE * r->n_frames) {
@@ -160,22 +189,6 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
         mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
                          "are these volts, or shares of another unit? Divide by the MVC",
                          "%s: no muscle reaches %.0f %% of its MVC", path, 100 * QUIET);
-    }
-    const double tense = tense_share(r, d->n_muscles);
-    if (n_there >= REST_CHANNELS && n_restless == n_there) {
-        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
-                         "an offset, mains hum or noise that was not taken off? Take off what each "
-                         "channel shows at rest: it moves all forces up",
-                         "%s: none of %d muscles is ever at rest (below %.0f %% of its MVC; the "
-                         "least is %.0f %%)",
-                         path, n_there, 100 * REST, 100 * least);
-    } else if (n_there >= MANY && tense > TENSE) {
-        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
-                         "an artefact that all channels have in common, hum, or a clock? High-pass "
-                         "raw EMG (20 Hz) before its envelope is made",
-                         "%s: all of %d muscles are active at once (above %.0f %% of the MVC) in "
-                         "%.0f %% of the frames",
-                         path, n_there, 100 * REST, 100 * tense);
     }
     mhi_text_free(&flat);
     mhi_text_free(&zero);
@@ -243,6 +256,7 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
     }
     if (status == MHE_OK) {
         check_channels(path, d, r, all, findings);
+        check_rest(path, d, r, all, findings);
         check_overlap(path, r, d->n_muscles, findings);
     }
     free(all);

@@ -3,6 +3,12 @@
 
 #include <string.h>
 
+/* Parts of a frame's time after which no posture is looked for elsewhere, and none any more. A
+ * model so large that they matter has no time for a step in that frame: the next ones bring it, and
+ * need postures that are near. */
+#define SEARCH 0.3
+#define POSTURES 0.9
+
 mhe_status mhi_begin_create(mhi_begin *b, const mhi_system *system, mhi_system_context *context,
                             int32_t nodes, mhi_arena *arena, mhe_error *err) {
     const int32_t n_q = mhi_system_face(system)->n_q;
@@ -84,6 +90,7 @@ static mhe_status guess_postures(mhe_estimator *e, double *distance, double *nea
     }
     *nearest = INFINITY;
     for (int32_t k = 0; k <= e->window.n; k++) {
+        mhi_pace_part(e, n_seen == 0 ? SEARCH : POSTURES);
         mhe_status status = (n_seen == 0 ? mhi_start_search : mhi_start_posture)(
             e->begin.start, mhi_row(markers->believed, k, 3 * e->n_k), q, &distance[k], err);
         if (status != MHE_OK) {
@@ -204,6 +211,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     mhi_pace_postures(e, 1);
     mhe_status status = guess_postures(e, e->begin.distance, &nearest, err);
     mhi_pace_postures(e, 0);
+    mhi_pace_part(e, 1);
     if (status != MHE_OK) {
         return status;
     }
@@ -222,7 +230,7 @@ mhe_status mhi_window_begin(mhe_estimator *e, mhe_error *err) {
     e->window.solution.has_multipliers = 0;
     e->window.has_left = 0;
     mhi_phase_on(e, MHI_EVENT_BEGUN);
-    e->begin.rounds = e->begin.stuck = 0;
+    e->begin.rounds = e->begin.steps = e->begin.stuck = e->begin.by_steps = 0;
     mhi_bands_forget(e->bands);
     mhi_window_set_bounds(e);
     if (e->window.solved == 0) {

@@ -19,8 +19,10 @@ typedef struct mhi_begin {
     int32_t has_posture; /* a channel that tells the posture came, be its values missing */
     int32_t waited;      /* used frames before the first window for want of a posture */
     int32_t rounds;      /* proximal solves since the window was begun */
+    int32_t steps;       /* iterations of these */
     int32_t restarted;   /* begun again and no solve has succeeded since */
-    int32_t stuck;       /* the last frame's work was not enough for one step of a beginning */
+    int32_t stuck;       /* so many frames' time or work was not enough for one step of it */
+    int32_t by_steps;    /* from then on, one step a frame, prepared ahead of it */
 } mhi_begin;
 
 mhe_status mhi_begin_create(mhi_begin *begin, const mhi_system *system, mhi_system_context *context,

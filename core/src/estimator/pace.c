@@ -18,14 +18,22 @@
  * seven 6. */
 #define SOLUTION 1.6
 /* The first window starts from far and has no frame before it: this much, of each interval; good
- * recordings take a fifth of it at most, elastic tendons on data of rigid ones nearly all: cut
- * there, the window would be lost to the frames after it. Where the integrator needs more than
- * PLAIN for an interval (finer steps, states of muscles) it is more, up to so many times. Frames
- * that come before a usual one is known share it, and each may take SLICE of it in any case. */
-#define FIRST 90000.0
+ * recordings take a third of it, as a rule. Where the integrator needs more than PLAIN for an
+ * interval (finer steps, states of muscles) it is more, up to DEARER times. What is not found by
+ * then the frames behind it go on looking for, in slices of what there is for LATER; when that is
+ * used up, too, the beginning rests: each frame gives back a little, and when WAKE is there the
+ * window begins anew from its measurements. So a beginning that takes long takes several frames, a
+ * recording that goes wrong at first is not lost, and one that is wrong costs little. A settled
+ * window whose usual frame is not known yet may take LEAST in any case. All of them are parts of
+ * the first. */
+#define FIRST 12000.0
 #define PLAIN 40.0
 #define DEARER 4.0
-#define SLICE 0.02
+#define LATER 0.5
+#define SLICE 0.05
+#define REFILL 0.0015
+#define WAKE 0.2
+#define LEAST 0.008
 /* Usual is at most this many times the least median that ever was: hard data must not raise their
  * own limit. */
 #define DRIFT 1.5
@@ -42,7 +50,8 @@ int32_t mhi_pace_by_clock(const mhe_estimator *e) {
 
 int32_t mhi_pace_late(void *estimator, double seconds) {
     mhe_estimator *e = estimator;
-    return mhi_looks_late(&e->pace.looks, e->pace.arrival + e->pace.budget, seconds,
+    const mhi_pace *p = &e->pace;
+    return mhi_looks_late(&e->pace.looks, p->arrival + p->part * p->budget, seconds,
                           mhi_ocp_work(e->ocp));
 }
 
@@ -51,7 +60,9 @@ static int32_t look(void *estimator) {
 }
 
 void mhi_pace_create(mhe_estimator *e) {
-    e->pace.all_first = e->pace.first = FIRST * e->window.n;
+    mhi_pace *p = &e->pace;
+    p->all_first = p->first = FIRST * e->window.n;
+    p->later = LATER * p->all_first;
 }
 
 void mhi_pace_measure(mhe_estimator *e) {
@@ -67,6 +78,7 @@ void mhi_pace_measure(mhe_estimator *e) {
     const double times = fmin(fmax(taken / PLAIN, 1), DEARER);
     p->first += (times - 1) * p->all_first;
     p->all_first *= times;
+    p->later *= times;
     if (!mhi_pace_by_clock(e)) { /* the frame in work takes part in it */
         int64_t more = (int64_t)((times - 1) * p->all_first / times);
         mhi_work_return(mhi_ocp_work(e->ocp), &more);
@@ -74,7 +86,23 @@ void mhi_pace_measure(mhe_estimator *e) {
 }
 
 static double first_share(const mhe_estimator *e) {
-    return fmax(e->pace.first, SLICE * e->pace.all_first);
+    const mhi_pace *p = &e->pace;
+    const double least = mhi_phase_settled(e) ? LEAST * p->all_first : 1;
+    return p->rests ? least : fmax(fmax(p->first, least), fmin(SLICE * p->all_first, p->later));
+}
+
+static void wake(mhi_pace *p) {
+    if (p->rests && p->later >= WAKE * p->all_first) {
+        p->first = p->later;
+        p->later = p->rests = 0;
+        p->woken = 1;
+    }
+}
+
+int32_t mhi_pace_wakes(mhe_estimator *e) {
+    const int32_t woken = e->pace.woken;
+    e->pace.woken = 0;
+    return woken;
 }
 
 static void begin_work(mhe_estimator *e, double most) {
@@ -84,6 +112,7 @@ static void begin_work(mhe_estimator *e, double most) {
 void mhi_pace_begin(mhe_estimator *e) {
     mhi_pace *p = &e->pace;
     p->settled = mhi_phase_settled(e);
+    p->part = 1;
     mhi_work *work = mhi_ocp_work(e->ocp);
     const int32_t timed = mhi_pace_by_clock(e), obeys = p->is_granted;
     if (timed) {
@@ -91,6 +120,7 @@ void mhi_pace_begin(mhe_estimator *e) {
         work->look = look;
         work->looker = e;
     } else {
+        wake(p);
         begin_work(e, p->usual > 0 ? SOLVE * p->usual : first_share(e));
     }
     mhi_looks_begin(&p->looks, obeys ? &p->granted : NULL, timed, work);
@@ -100,7 +130,7 @@ void mhi_pace_begin(mhe_estimator *e) {
 void mhi_pace_predict(mhe_estimator *e) {
     const mhi_pace *p = &e->pace;
     if (!mhi_pace_by_clock(e)) {
-        begin_work(e, p->usual > 0 ? PREDICT * p->usual : SLICE * first_share(e));
+        begin_work(e, PREDICT * (p->usual > 0 ? p->usual : LEAST * p->all_first));
     }
 }
 
@@ -112,6 +142,10 @@ void mhi_pace_postures(mhe_estimator *e, int32_t begun) {
         moved = -e->pace.kept;
     }
     mhi_work_return(work, &moved);
+}
+
+void mhi_pace_part(mhe_estimator *e, double part) {
+    e->pace.part = part;
 }
 
 int32_t mhi_pace_over(mhe_estimator *e) {
@@ -171,6 +205,17 @@ static void learn(mhi_pace *p, double work) {
     }
 }
 
+/* What a frame without a usual one before it leaves to the others. */
+static void spend(mhe_estimator *e, double work) {
+    mhi_pace *p = &e->pace;
+    p->later =
+        fmax(p->later - fmax(work - p->first, 0), 0) + (p->rests ? REFILL * p->all_first : 0);
+    p->first = fmax(p->first - work, 0);
+    if (p->first == 0 && p->later < SLICE * p->all_first && !mhi_phase_settled(e)) {
+        p->rests = 1;
+    }
+}
+
 /* Nothing is told of a first window that took its time and settled. */
 static void tell_first(mhe_estimator *e) {
     char line[256];
@@ -190,9 +235,9 @@ void mhi_pace_end(mhe_estimator *e, int32_t frame_status) {
     const int32_t converged = frame_status == MHE_FRAME_OK && p->settled;
     const int32_t ended =
         converged || (frame_status == MHE_FRAME_ITERATION_LIMIT && p->settled && !p->over);
-    if (p->usual == 0) {
-        p->first = fmax(p->first - work, 0);
-        if (p->first == 0 && !p->first_told && !mhi_phase_settled(e)) {
+    if (p->usual == 0 && !mhi_pace_by_clock(e)) {
+        spend(e, work);
+        if (p->rests && !p->first_told) {
             tell_first(e);
         }
     }

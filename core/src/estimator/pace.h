@@ -14,6 +14,7 @@
 typedef struct mhi_pace {
     double budget;                  /* s from a frame's arrival to its estimate; 0: no limit */
     double arrival;                 /* of the frame in work, s of CLOCK_MONOTONIC */
+    double part;                    /* of the budget, that what is done now may take */
     double ahead;                   /* s spent by mhe_estimator_prepare on the next estimate */
     int64_t kept;                   /* from the search of postures */
     double prepared;                /* work of the same */
@@ -21,7 +22,8 @@ typedef struct mhi_pace {
     int32_t n_frames, n_converged;  /* so far */
     double usual;                   /* 0: not known yet */
     double least;                   /* that usual was */
-    double first, all_first;        /* what is left for the frames until then, and was */
+    double first, later, all_first; /* left for the frames until then, see pace.c; first at first */
+    int32_t rests, woken;           /* no window is begun until there is enough of it again */
     int32_t first_told;
     int32_t settled; /* the frame in work is no beginning */
     int32_t over;    /* its time or work was over when it was solved */
@@ -31,6 +33,8 @@ typedef struct mhi_pace {
 } mhi_pace;
 
 void mhi_pace_create(mhe_estimator *e);
+/* 1: it is time to begin the window anew, after a rest. */
+int32_t mhi_pace_wakes(mhe_estimator *e);
 /* The first window has its guess: what an interval takes. Overwrites the solution. */
 void mhi_pace_measure(mhe_estimator *e);
 /* The frame in work begins; and its solve, with what is left; and the prediction that stands in for
@@ -40,6 +44,9 @@ void mhi_pace_predict(mhe_estimator *e);
 /* The search of postures of a window that begins has begun (1) or ended (0): a part of the frame's
  * work is kept for the solve. */
 void mhi_pace_postures(mhe_estimator *e, int32_t begun);
+/* By the clock: what is done from now on may take until this part of the frame's time is over; 1 at
+ * its begin. */
+void mhi_pace_part(mhe_estimator *e, double part);
 /* 1: its time or work is over. The others: mhe_solve_control.spent and late. */
 int32_t mhi_pace_over(mhe_estimator *e);
 int32_t mhi_pace_spent(void *estimator, int32_t solutions);

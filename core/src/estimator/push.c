@@ -20,7 +20,7 @@ mhe_status mhe_estimator_prepare(mhe_estimator *e, mhe_error *err) {
     const double begin = mhi_seconds();
     mhi_pace_prepare(e);
     mhi_window_follow(e);
-    if (e->solver->prepare != NULL && mhi_phase_settled(e)) {
+    if (e->solver->prepare != NULL && (mhi_phase_settled(e) || e->begin.by_steps)) {
         status = e->solver->prepare(e->solver_self, &e->window.solution, err);
     }
     mhi_pace_prepared(e, mhi_seconds() - begin);
@@ -76,6 +76,8 @@ static mhe_status begin_window(mhe_estimator *e, int32_t *known, mhe_error *err)
     return mhi_window_begin(e, err);
 }
 
+#define MOST_STUCK 3 /* frames: one to find out, those after it have their step prepared */
+
 /* Start and targets of the full window. `*known`: it can be solved. */
 static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err) {
     mhe_status status = MHE_OK;
@@ -84,8 +86,9 @@ static mhe_status start_window(mhe_estimator *e, int32_t *known, mhe_error *err)
         mhi_window_follow(e);
         look_for_late(e);
         mhi_trust_screen(e);
-        /* Where not even a step was made from the old guess, today's measurements are nearer. */
-        if (mhi_trust_is_lost(e) || (e->begin.stuck && e->begin.restarted)) {
+        /* Where no step was made from the old guess, today's measurements are nearer. */
+        if (mhi_pace_wakes(e) ||
+            (!e->pace.rests && (mhi_trust_is_lost(e) || e->begin.stuck >= MOST_STUCK))) {
             (void)mhi_window_begin(e, NULL); /* where it cannot, the old start goes on */
         }
     } else {

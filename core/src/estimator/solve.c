@@ -11,12 +11,14 @@
 /* A window that begins, see settle(). */
 #define FIRST_SOLVES 10    /* at most */
 #define FIRST_WEIGHT 100.0 /* of the proximal term on velocities and activations */
+#define FIRST_STEPS 10     /* iterations after which a motion cut short will do */
 #define FIRST_MOVE 0.02    /* 1, rad/s: so near to its centre the term no longer matters */
 
 /* An unfinished iterate is handed out only if something was done to it and it is a motion of the
  * model: largest jump between intervals that may remain, rad, rad/s, 1. Else its states would start
  * the next window and the error would stay. */
 #define CONSISTENT 1e-2
+#define ROUGHLY 10 /* times that: near enough for the steps of a settled window to close it */
 
 static void take_back_guess(mhe_estimator *e) {
     memcpy(e->window.solution.x, e->window.guess_x,
@@ -60,7 +62,8 @@ static mhe_status solve_once(mhe_estimator *e, mhe_solve_info *info, mhe_error *
         .deadline = timed && !e->pace.looks.obeys ? e->pace.arrival + e->pace.budget : 0,
         .budget = e,
         .spent = mhi_pace_spent,
-        .late = timed ? mhi_pace_late : NULL};
+        .late = timed ? mhi_pace_late : NULL,
+        .one_step = !mhi_phase_settled(e) && e->begin.by_steps};
     *info = (mhe_solve_info){.size = sizeof *info};
     return e->solver->solve(e->solver_self, &control, &e->window.solution, info, err);
 }
@@ -124,16 +127,21 @@ static mhe_status settle(mhe_estimator *e, mhe_solve_info *info, mhe_error *err)
         fallbacks += info->fallbacks;
         evaluation_time += info->evaluation_time;
         const int32_t converged = status == MHE_OK && info->outcome == MHE_SOLVE_CONVERGED;
-        const int32_t over = status == MHE_OK && info->outcome == MHE_SOLVE_DEADLINE;
-        e->begin.rounds += !over;
-        factor = converged || over ? 1 : 10;
+        const int32_t over = status == MHE_OK && (info->outcome == MHE_SOLVE_DEADLINE ||
+                                                  (!converged && mhi_pace_over(e)));
+        /* A motion that came of steps, though not of all: the frames after it go on from it. */
+        const int32_t moved = info->iterations > 0 && info->primal_residual <= ROUGHLY * CONSISTENT;
+        e->begin.steps += info->iterations;
+        e->begin.rounds += over ? moved : 1;
+        factor = converged || over || e->begin.by_steps ? 1 : 10;
+        cut = over || e->begin.by_steps || mhi_pace_over(e);
         if ((converged && first_state_move(e, e->window.prior_centre) < FIRST_MOVE) ||
-            e->begin.rounds >= FIRST_SOLVES || status != MHE_OK) {
+            (over && moved && e->begin.steps >= FIRST_STEPS) || e->begin.rounds >= FIRST_SOLVES ||
+            status != MHE_OK) {
             mhi_phase_on(e, MHI_EVENT_SETTLED);
         }
-        cut = over || mhi_pace_over(e);
     }
-    if (cut && !mhi_phase_settled(e) && info->outcome == MHE_SOLVE_CONVERGED) {
+    if (cut && !mhi_phase_settled(e) && info->outcome <= MHE_SOLVE_ITERATION_LIMIT) {
         info->outcome = MHE_SOLVE_DEADLINE; /* of what is not yet the last round */
     }
     if (mhi_phase_settled(e)) {
@@ -180,24 +188,28 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
            sizeof(double) * (size_t)(e->window.n + 1) * (size_t)e->window.n_x);
     memcpy(e->window.guess_u, e->window.solution.u,
            sizeof(double) * (size_t)e->window.n * (size_t)e->n_u);
-    const mhe_status status = (mhi_phase_settled(e) ? solve_once : settle)(e, info, &why);
+    const int32_t begins = !mhi_phase_settled(e);
+    const mhe_status status = (begins ? settle : solve_once)(e, info, &why);
     if (e->stop != NULL && atomic_load_explicit(e->stop, memory_order_relaxed)) {
         return mhe_fail(err, MHE_E_INTERRUPTED, "interrupted");
     }
     if (status != MHE_OK) {
         tell_failure(e, why.text);
     }
-    e->begin.stuck =
+    const int32_t none =
         !mhi_phase_settled(e) && info->outcome == MHE_SOLVE_DEADLINE && info->iterations == 0;
+    e->begin.stuck = none ? e->begin.stuck + 1 : 0;
+    e->begin.by_steps |= none;
     const int finite =
         mhi_all_finite(e->window.solution.x, (ptrdiff_t)(e->window.n + 1) * e->window.n_x) &&
         mhi_all_finite(e->window.solution.u, (ptrdiff_t)e->window.n * e->n_u);
     const int begun = info->iterations > 0 || info->outcome == MHE_SOLVE_CONVERGED;
     const int usable = status == MHE_OK && finite && begun && info->primal_residual <= CONSISTENT;
+    const int rough = status == MHE_OK && finite && info->primal_residual <= ROUGHLY * CONSISTENT;
     *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;
     if (*frame_status != MHE_FRAME_PREDICTED) {
         e->begin.restarted = 0;
-    } else if (mhi_phase_settled(e)) {
+    } else if (mhi_phase_settled(e) && !(begins && rough)) {
         predict(e);
     } else if (!finite) { /* else what was reached in the time starts the next frame's solve */
         take_back_guess(e);

@@ -149,13 +149,11 @@ static mhe_status keep_paths(mhi_joint_force *j, mhe_error *err) {
     d->n_paths = n;
     d->n_muscles = d->n_markers = d->n_loops = d->n_path_springs = d->n_ligaments = 0;
     d->n_actuators = d->n_limits = d->n_coordinate_springs = d->n_bushings = 0;
-    d->motion_lower = d->motion_upper = NULL;
     return MHE_OK;
 }
 
 static mhe_status build(mhi_joint_force *j, const char *name, mhe_error *err) {
     const mhi_system *s = j->system;
-    const void *config = NULL;
     mhe_status status = find_joint(j, name, err);
     if (status == MHE_OK) {
         status = find_bodies(j, err);
@@ -169,14 +167,11 @@ static mhe_status build(mhi_joint_force *j, const char *name, mhe_error *err) {
     if (status == MHE_OK) {
         status = keep_paths(j, err);
     }
-    if (status == MHE_OK) {
-        status = mhi_joints_exact_paths(s->model_plugin, s->model_config, &j->arena, &config, err);
-    }
     j->quiet = *(const mhe_host *)s->host.data;
     j->quiet.log = say_nothing;
-    return status == MHE_OK
-               ? mhi_model_create(s->model_plugin, &j->quiet, &j->loosened, config, &j->self, err)
-               : status;
+    return status == MHE_OK ? mhi_model_create(s->model_plugin, &j->quiet, &j->loosened,
+                                               s->model_config, &j->self, err)
+                            : status;
 }
 
 mhe_status mhi_joint_force_create(const mhi_system *system, const char *name,

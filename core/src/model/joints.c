@@ -3,9 +3,11 @@
 
 #include "config/options_table.h"
 
+#include <math.h>
 #include <string.h>
 
 #define SIX 6
+#define REACH 0.01 /* m: over which a path may be fitted to tell its direction at 0 */
 
 static const double one[2] = {0, 1}, zero[1] = {0};
 
@@ -56,7 +58,9 @@ static mhe_status add_motions(const mhe_description *d, int32_t body, mhi_arena 
     *out = *d;
     memcpy(coordinates, d->coordinates, sizeof *coordinates * (size_t)n);
     for (int32_t i = 0; i < n_more; i++) {
-        coordinates[n + i] = (mhe_coordinate){.name = "of a joint", .lower = -1, .upper = 1};
+        const double reach = all ? 1 : REACH;
+        coordinates[n + i] =
+            (mhe_coordinate){.name = "of a joint", .lower = -reach, .upper = reach};
     }
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < d->n_bodies && status == MHE_OK; i++) {
@@ -120,10 +124,31 @@ mhe_status mhi_joints_open(const mhe_description *d, mhi_arena *arena, mhe_descr
     return status == MHE_OK ? move_numbers(d, arena, out, err) : status;
 }
 
+/* Where the motion keeps to, of which nothing is known of the shifts. */
+static mhe_status extend_motion(const mhe_description *d, mhi_arena *arena, mhe_description *out,
+                                mhe_error *err) {
+    const double *const given[] = {d->motion_lower, d->motion_upper};
+    const double **const to[] = {&out->motion_lower, &out->motion_upper};
+    for (int32_t k = 0; k < 2; k++) {
+        double *range = given[k] == NULL ? NULL : MHI_TAKE(arena, double, out->n_coordinates);
+        if (given[k] != NULL && range == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+        for (int32_t i = 0; i < out->n_coordinates && range != NULL; i++) {
+            range[i] = i < d->n_coordinates ? given[k][i] : NAN;
+        }
+        *to[k] = range;
+    }
+    return MHE_OK;
+}
+
 mhe_status mhi_joints_loosen(const mhe_description *d, int32_t body, mhi_arena *arena,
                              mhe_description *out, mhe_error *err) {
-    const mhe_status status = add_motions(d, body, arena, out, err);
-    return status == MHE_OK ? move_numbers(d, arena, out, err) : status;
+    mhe_status status = add_motions(d, body, arena, out, err);
+    if (status == MHE_OK) {
+        status = move_numbers(d, arena, out, err);
+    }
+    return status == MHE_OK ? extend_motion(d, arena, out, err) : status;
 }
 
 mhe_status mhi_joints_exact_paths(const mhe_plugin *model, const void *config, mhi_arena *arena,

@@ -36,7 +36,7 @@ void mhi_joints_reaction(const mhe_description *d, int32_t i, const double *pose
 
 /* Reactions of a system's joints. */
 typedef struct mhi_reactions mhi_reactions;
-/* MHE_E_UNSUPPORTED: a muscle whose path has no points; loops. `setup` is the one of the system.
+/* MHE_E_UNSUPPORTED: a muscle whose path has no points. `setup` is the one of the system.
  * [cold] */
 mhe_status mhi_reactions_create(const mhi_system_setup *setup, const mhi_system *system,
                                 mhi_reactions **reactions, mhe_error *err);

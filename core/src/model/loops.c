@@ -141,17 +141,9 @@ mhe_status mhi_loops_close(mhi_system_context *c, int32_t derivatives, double *v
     return MHE_OK;
 }
 
-mhe_status mhi_loops_linearise(mhi_system_context *c, const double *vdot, double *tau_q,
-                               mhe_error *err) {
+void mhi_loops_loads(mhi_system_context *c, double share) {
     const mhi_system *s = c->system;
     const mhe_description *d = s->description;
-    const mhe_loop_values wanted = {.size = sizeof wanted,
-                                    .acceleration_q = c->gap_acceleration_q,
-                                    .acceleration_v = c->gap_acceleration_v};
-    mhe_status status = s->model->loops(c->model, vdot, &wanted, err);
-    if (status != MHE_OK) {
-        return status;
-    }
     for (int32_t i = 0, loop = 0, row = 0; i < s->n_loop_loads; i++) {
         const int32_t frame = s->loop_of[i] % 2;
         for (; loop < s->loop_of[i] / 2; loop++) {
@@ -159,13 +151,26 @@ mhe_status mhi_loops_linearise(mhi_system_context *c, const double *vdot, double
         }
         const int32_t weld = d->loops[loop].kind == MHE_LOOP_WELD;
         double *value = c->loop_value + 9 * i;
-        for (int32_t k = 0; k < 3; k++) { /* what it takes off the inverse dynamics */
-            const double sign = frame == 0 ? 1 : -1;
+        for (int32_t k = 0; k < 3; k++) {
+            const double sign = frame == 0 ? -share : share;
             value[k] = sign * c->loop_force[row + k];
             value[3 + k] = d->loops[loop].p[frame][k];
             value[6 + k] = weld ? sign * c->loop_force[row + 3 + k] : 0;
         }
     }
+}
+
+mhe_status mhi_loops_linearise(mhi_system_context *c, const double *vdot, double *tau_q,
+                               mhe_error *err) {
+    const mhi_system *s = c->system;
+    const mhe_loop_values wanted = {.size = sizeof wanted,
+                                    .acceleration_q = c->gap_acceleration_q,
+                                    .acceleration_v = c->gap_acceleration_v};
+    mhe_status status = s->model->loops(c->model, vdot, &wanted, err);
+    if (status != MHE_OK) {
+        return status;
+    }
+    mhi_loops_loads(c, -1); /* what it takes off the inverse dynamics */
     return s->model->loads(c->model, s->loop_loads, s->n_loop_loads, c->loop_value, NULL, tau_q,
                            NULL, err);
 }

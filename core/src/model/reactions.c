@@ -55,13 +55,9 @@ static mhe_status build(mhi_reactions *r, const mhi_system_setup *setup, mhe_err
                             i < d->n_muscles ? d->muscles[i].name : "a spring");
         }
     }
-    if (d->n_loops > 0) {
-        return mhe_fail(err, MHE_E_UNSUPPORTED,
-                        "output.reactions: the model has loops, and what their joints transmit "
-                        "is not known yet");
-    }
     mhe_status status = mhi_joints_open(d, &r->arena, &r->opened, err);
     if (status == MHE_OK) {
+        r->opened.n_loops = 0; /* what closes them is a load here */
         status = mhi_joints_exact_paths(setup->model, setup->model_config, &r->arena, &config, err);
     }
     if (status == MHE_OK) {
@@ -149,6 +145,10 @@ mhe_status mhi_reactions_solve(mhi_reactions *r, mhi_system_context *c, const mh
     }
     if (status == MHE_OK) {
         status = mhi_forces_pull(c, at, &pulls, add_loads, r, err);
+    }
+    if (status == MHE_OK && r->system->n_loop_loads > 0) {
+        mhi_loops_loads(c, 1);
+        status = add_loads(r, r->system->loop_loads, r->system->n_loop_loads, c->loop_value, err);
     }
     if (status == MHE_OK && r->system->n_actuators > 0) {
         status = add_actuators(r, at->r + r->system->n_residual, err);

@@ -162,6 +162,9 @@ mhe_status mhi_loops_close(mhi_system_context *c, int32_t derivatives, double *v
  * inverse dynamics. */
 mhe_status mhi_loops_linearise(mhi_system_context *c, const double *vdot, double *tau_q,
                                mhe_error *err);
+/* `share` times what closes them on s->loop_loads, into c->loop_value [n_loop_loads x 9]: of the
+ * context's last acceleration. */
+void mhi_loops_loads(mhi_system_context *c, double share);
 void mhi_loops_closed(const mhi_system_context *c, int32_t by, double *columns, int32_t n);
 
 /* forces.c: instances; generalised force of all force plugins, left in c->other, with derivatives
