@@ -90,13 +90,14 @@ function showElectrodes(s) {
 
 let told = "";
 function showState(s) {
-  const key = JSON.stringify(s);
+  showStreams(s);
+  const key = JSON.stringify([s.recording, s.up, s.electrodes, s.mvc, s.mvc_file]);
   if (key === told) return;
   told = key;
   recording = !!s.recording; up = s.up === 2 ? 2 : 1;
   $("record").setAttribute("aria-pressed", recording); $("record").textContent = recording ? "Stop recording" : "Record";
   $("record").title = s.recording || "";
-  showStreams(s); showElectrodes(s);
+  showElectrodes(s);
 }
 $("record").onclick = () => send(recording ? "record-stop" : "record-start");
 $("stop").onclick = () => { if (confirm("End the run?")) send("stop"); };

@@ -11,7 +11,9 @@
 #define CLOCK_EVERY 2.0 /* s between two looks at a sender's clock */
 #define CLOCK_FIRST 2.0 /* s that the first look may take */
 #define LOOK_EVERY 0.1  /* s between two looks at a search */
-#define WAIT 0.0003     /* s between two looks where nothing is there */
+#define WAIT 0.0005     /* s between two looks where nothing is there */
+#define CLOSE 0.00004   /* s between two while a frame is due */
+#define DUE 0.0015      /* s before and after its time in which it is due */
 #define MOST_PULLS 64   /* of one stream in a row */
 
 double lsl_now(void) {
@@ -261,6 +263,23 @@ static int32_t drain(lsl_source *source, int markers, const mhe_source_taker *ta
     return total;
 }
 
+/* How long to rest where nothing is there: liblsl tells nobody that something has come, and its own
+ * waiting is a look each millisecond. Frames come by their rate, so the next one is looked for
+ * closely when it is due, and a sleep before that ends in time. */
+static double pause_of(const lsl_source *source) {
+    const double now = lsl_now();
+    double pause = WAIT;
+    for (int32_t i = 0; i < source->n_streams; i++) {
+        const lsl_stream *s = &source->streams[i];
+        if (s->kind == MHE_STREAM_EMG || s->rate <= 0 || s->rate > 0.25 / DUE) {
+            continue; /* waits for frames, or is never far from its next sample */
+        }
+        const double left = s->newest + 1 / s->rate - now;
+        pause = fmin(pause, left > DUE ? fmax(left - DUE, CLOSE) : left > -DUE ? CLOSE : WAIT);
+    }
+    return pause;
+}
+
 /* Frames come last: what was measured by then is there already. */
 static mhe_status lsl_source_read(void *self, double deadline, const mhe_source_taker *taker,
                                   mhe_error *err) {
@@ -274,7 +293,7 @@ static mhe_status lsl_source_read(void *self, double deadline, const mhe_source_
             watch(source, i, taker);
         }
         if (n == 0) {
-            rest(WAIT);
+            rest(pause_of(source));
         }
     } while (n == 0 && lsl_now() < deadline);
     return MHE_OK;
