@@ -112,10 +112,10 @@ static void by_the_clock(void **state) {
     assert_true(stuck > 0); /* or the looks were no scarcity */
 }
 
-/* Elastic tendons of other curves on data of rigid ones: 240 iterations, and work for a tenth. */
+/* Elastic tendons of other curves on data of rigid ones: more work than a first frame has. */
 static void by_work(void **state) {
     (void)state;
-    run_of o = {.first = 0.5, .elastic = 1};
+    run_of o = {.first = 1, .elastic = 1};
     run(presets[1], &o);
     print_message("elastic tendons: settled with estimate %d, status %d, angles %.2g rad off\n",
                   (int)o.settled, (int)o.status, o.off);
