@@ -59,6 +59,26 @@ static int32_t thinned(const view_tables *t, int32_t i, int32_t *kept) {
     return n;
 }
 
+static double value_at(const rows *r, int32_t row, int32_t column) {
+    return r->is.values[(ptrdiff_t)row * r->is.n_columns + column];
+}
+
+/* The smallest and the largest value of rows `from` to `to`, in the order in which they come; NaN
+ * where there is none. */
+static void extremes(const rows *r, int32_t column, int32_t from, int32_t to, double out[2]) {
+    int32_t low = -1, high = -1;
+    for (int32_t k = from; k < to; k++) {
+        const double v = value_at(r, k, column);
+        low = isfinite(v) && (low < 0 || v < value_at(r, low, column)) ? k : low;
+        high = isfinite(v) && (high < 0 || v > value_at(r, high, column)) ? k : high;
+    }
+    out[0] = low < 0 ? NAN : value_at(r, low < high ? low : high, column);
+    out[1] = low < 0 ? NAN : value_at(r, low < high ? high : low, column);
+}
+
+/* `column` -1: the time. Of a table with more rows than are drawn, two rows that follow each other
+ * have what lies between this pair and the next at its smallest and largest: no peak is lost, and
+ * what is periodic is no other wave. */
 static void add_column(mhi_text *out, const view_tables *t, int32_t i, int32_t column,
                        double scale) {
     int32_t kept[POINTS + 1];
@@ -67,9 +87,14 @@ static void add_column(mhi_text *out, const view_tables *t, int32_t i, int32_t c
     const int32_t n = thinned(t, i, kept);
     for (int32_t k = 0; k < n; k++) {
         values[k] =
-            (float)(column < 0
-                        ? r->is.time[kept[k]]
-                        : scale * r->is.values[(ptrdiff_t)kept[k] * r->is.n_columns + column]);
+            (float)(column < 0 ? r->is.time[kept[k]] : scale * value_at(r, kept[k], column));
+    }
+    for (int32_t k = 0; column >= 0 && k + 1 < n && kept[k + 1] - kept[k] > 1; k += 2) {
+        const int32_t end = 2 * kept[k + 1] - kept[k];
+        double pair[2];
+        extremes(r, column, kept[k], end < r->is.n_rows ? end : r->is.n_rows, pair);
+        values[k] = (float)(scale * pair[0]);
+        values[k + 1] = (float)(scale * pair[1]);
     }
     view_numbers(out, values, (size_t)n);
 }

@@ -9,12 +9,9 @@
 #include "web.h"
 
 #include <math.h>
-#include <netinet/in.h>
-#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
 
 #define STATE_EVERY 0.5  /* s */
 #define PACE_MOST 1.0    /* s */
@@ -134,20 +131,16 @@ int web_is_due(const web *w, const web_client *c) {
                                      web_now() - c->served > c->pace - PACE_EARLY);
 }
 
-static void hold_back(const web_client *c, int on) {
-    (void)setsockopt(lws_get_socket_fd(c->wsi), IPPROTO_TCP, TCP_CORK, &on, sizeof on);
-}
-
 /* All frames that are there, in one go: a browser wakes once for them. */
 static int send_frames(web *w, web_client *c, double now) {
     int result = 0;
     c->served = c->next < c->until ? c->served : now;
     c->until = w->n_frames;
-    hold_back(c, 1);
+    web_hold(c, 1);
     do {
         result = send_frame(w, c);
-    } while (result == 0 && c->next < w->n_frames && !lws_send_pipe_choked(c->wsi));
-    hold_back(c, 0);
+    } while (result == 0 && c->next < w->n_frames && !web_is_full(c));
+    web_hold(c, 0);
     return result;
 }
 

@@ -4,10 +4,13 @@
 #include "web.h"
 
 #include <math.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
+#include <sys/socket.h>
 #include <time.h>
 
 #define STATE_ROOM 65536 /* bytes of the run's state */
@@ -24,6 +27,14 @@ int web_write(web *w, web_client *c, size_t n, int text) {
     const int sent =
         lws_write(c->wsi, w->out + LWS_PRE, n, text ? LWS_WRITE_TEXT : LWS_WRITE_BINARY);
     return sent < (int)n ? -1 : 0;
+}
+
+void web_hold(const web_client *c, int on) {
+    (void)setsockopt(lws_get_socket_fd(c->wsi), IPPROTO_TCP, TCP_CORK, &on, sizeof on);
+}
+
+int web_is_full(const web_client *c) {
+    return lws_send_pipe_choked(c->wsi);
 }
 
 static web *web_of(struct lws *wsi) {

@@ -103,6 +103,8 @@ int web_send_foxglove(web *w, web_client *c);
 
 /* server.c: sends `n` bytes at w->out + LWS_PRE. */
 int web_write(web *w, web_client *c, size_t n, int text);
+void web_hold(const web_client *c, int on); /* what is written waits for what follows, until 0 */
+int web_is_full(const web_client *c);       /* no more can be written now */
 
 /* answer.c */
 int web_send_answer(web *w, web_client *c); /* c->answer, if any; 1: sent */

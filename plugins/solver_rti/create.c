@@ -65,8 +65,10 @@ static void place(rti_solver *s, block *b) {
     }
     place_point(b, shape, &s->here);
     place_point(b, shape, &s->trial);
-    double **const of_z[] = {&s->lower, &s->upper,   &s->z_lower,       &s->z_upper,
-                             &s->slope, &s->first.w, &s->first.z_lower, &s->first.z_upper};
+    double **const of_z[] = {&s->lower,   &s->upper,         &s->z_lower,       &s->z_upper,
+                             &s->first.w, &s->first.z_lower, &s->first.z_upper, &s->slope,
+                             &s->last.w,  &s->last.z_lower,  &s->last.z_upper,  &s->last_from,
+                             &s->before};
     for (size_t i = 0; i < sizeof of_z / sizeof of_z[0]; i++) {
         *of_z[i] = cut_doubles(b, z);
     }
@@ -78,6 +80,7 @@ static void place(rti_solver *s, block *b) {
     s->joint = cut_doubles(b, (n_x + n_u) * (size_t)shape->ld_z);
     s->lambda = cut_doubles(b, x);
     s->first.lambda = cut_doubles(b, x);
+    s->last.lambda = cut_doubles(b, x);
     s->weight = cut_doubles(b, x);
     s->gaps = cut_doubles(b, x);
     s->stage_cost = cut_doubles(b, n_stages);

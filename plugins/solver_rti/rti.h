@@ -56,6 +56,12 @@ typedef struct rti_leap {
     double cost;      /* scaled, of the quadratic model at the result */
 } rti_leap;
 
+/* What a program came to. */
+typedef struct rti_program_result {
+    double *w, *lambda, *z_lower, *z_upper; /* as in qp */
+    double stationarity, feasibility, complementarity, open;
+} rti_program_result;
+
 typedef struct rti_solver {
     const mhe_host *host;
     const struct rti_config *config;
@@ -67,10 +73,15 @@ typedef struct rti_solver {
     double *lower, *upper;              /* [size_z] of w */
     double *lambda, *z_lower, *z_upper; /* at `here` */
     double *slope, *gaps;               /* scratch [size_z], [size_x] */
-    struct {
-        double *w, *lambda, *z_lower, *z_upper;
-        double stationarity, feasibility, complementarity, open;
-    } first;                     /* result of a program whose step is looked at twice */
+    rti_program_result first;           /* of a program whose step is looked at twice */
+    rti_program_result last;     /* of the iteration before (between.c), without its residuals, */
+    double *last_from;           /* [size_z] the iterate it starts from, */
+    double last_damping;         /* of it */
+    int32_t last_is_known;       /* in this solve */
+    int32_t missed_kinks;        /* in it */
+    double *before;              /* [size_z] the iterate before last_from */
+    int32_t on_kink;             /* the last step went along one */
+    int32_t stays;               /* the solution is at a kink, the iterate there already */
     double *result;              /* [size_z] w of the last solve */
     int32_t has_result;          /* it gave one; 2: its covariances are known */
     double *spread;              /* [N+1][n_x x ld_x] covariances of x, of the scaled cost */
@@ -144,6 +155,7 @@ int32_t rti_program(rti_solver *s, int32_t from_last);
 #define RTI_HALVINGS 8                         /* of a step, at most */
 void rti_reach(rti_solver *s, double length);  /* trial.w = here.w + length * step, in the bounds */
 void rti_accept(rti_solver *s, double length); /* the trial point becomes `here` */
+void rti_accept_multipliers(rti_solver *s, double length);
 #define RTI_PENALTY 1.5 /* of the gaps in an exact merit, times the largest multiplier */
 double rti_largest_multiplier(const rti_solver *s);
 int32_t rti_cut_short(rti_solver *s);    /* from a program that is not to be stepped on further */
@@ -151,6 +163,20 @@ int32_t rti_is_over(const void *solver); /* deadline or work; asked before each 
 
 /* search.c: the same by a step that must help. `cut`: it may end as RTI_CUT. */
 int32_t rti_step_globalised(rti_solver *s, int32_t cut);
+
+/* between.c: the program's result gives way to a mean with the last one, where they go to and fro,
+ * and RTI_KINK is what lies between; 0: they do not. The result itself is put aside in `first`,
+ * residuals apart; `share` of the last one in the mean. last_from is then this iterate,
+ * `before` the one before. */
+#define RTI_KINK 2
+int32_t rti_between(rti_solver *s, double *share);
+
+/* kink.c: `here` moves to the kink between it and `before`; its linearisation is then the mean of
+ * both sides and the program solved. 0: no kink was found, and `here` is no point. */
+int32_t rti_step_along_kink(rti_solver *s, double share);
+double rti_edge(const rti_solver *s); /* between both sides, in any variable (rad, rad/s, 1) */
+/* Is there one between `here` and the end of the program's step, as `before`? */
+int32_t rti_finds_kink(rti_solver *s, double *share);
 
 /* create.c */
 mhe_status rti_accepts(const mhe_stage_problem *problem, const void *config, mhe_error *err);

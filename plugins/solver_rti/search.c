@@ -11,6 +11,7 @@
 #define MOST_DAMPING 1e9
 /* Part of the least residual so far that a step may leave, whatever its merit. */
 #define NEARER 0.5
+#define MOST_MISSED 12 /* kinks of a solve that are looked for in vain */
 
 /* merit = cost + sum of weight * |gap| */
 static double merit(const rti_solver *s, const rti_point *point) {
@@ -78,6 +79,14 @@ static int32_t is_nearer(rti_solver *s, double slope) {
 }
 
 /* The program's result is put aside, or is there again: what a step is made of. */
+static void keep_residuals(rti_solver *s) {
+    const qp *q = &s->qp;
+    s->first.stationarity = q->stationarity;
+    s->first.feasibility = q->feasibility;
+    s->first.complementarity = q->complementarity;
+    s->first.open = q->open;
+}
+
 static void keep_first(rti_solver *s) {
     const size_t z = sizeof(double) * size_z(&s->shape), x = sizeof(double) * size_x(&s->shape);
     const qp *q = &s->qp;
@@ -85,10 +94,7 @@ static void keep_first(rti_solver *s) {
     memcpy(s->first.z_lower, q->z_lower, z);
     memcpy(s->first.z_upper, q->z_upper, z);
     memcpy(s->first.lambda, q->lambda, x);
-    s->first.stationarity = q->stationarity;
-    s->first.feasibility = q->feasibility;
-    s->first.complementarity = q->complementarity;
-    s->first.open = q->open;
+    keep_residuals(s);
 }
 
 static void recall_first(rti_solver *s) {
@@ -157,8 +163,81 @@ static void adapt_damping(rti_solver *s, double length) {
     }
 }
 
+/* On a kink the merit function tells no points apart that are as near as its sides are held. */
+static int32_t is_on_edge(const rti_solver *s) {
+    return merit(s, &s->trial) <= merit(s, &s->here) + s->penalty * rti_edge(s);
+}
+
+/* The step along a kink between this iterate and `before`; where there is none to go, this is the
+ * solution. Else back to where it came from. */
+static int32_t step_along_kink(rti_solver *s, double share) {
+    if (rti_step_along_kink(s, share)) {
+        const rti_residuals r =
+            rti_residuals_of(s, &s->here, s->qp.lambda, s->qp.z_lower, s->qp.z_upper);
+        s->stays = rti_excess(&r) <= s->config->tolerance;
+        if (s->stays) {
+            return 1;
+        }
+        const double slope = merit_slope(s, 0);
+        rti_reach(s, 1);
+        s->on_kink =
+            rti_evaluate(s, &s->trial, RTI_ALL) && (is_better(s, 1, slope) || is_on_edge(s));
+        if (s->on_kink) {
+            return 1;
+        }
+    }
+    s->missed_kinks++;
+    s->last_is_known = 0;
+    memcpy(s->here.w, s->last_from, sizeof(double) * size_z(&s->shape));
+    if (s->failure == MHE_OK && rti_evaluate(s, &s->here, RTI_ALL)) {
+        rti_set_damping(s, &s->here, s->config->regularisation + s->damping);
+    }
+    return 0;
+}
+
+static int32_t may_seek_kink(rti_solver *s) {
+    return s->failure == MHE_OK && s->missed_kinks < MOST_MISSED && !rti_is_over(s);
+}
+
+/* Tries the step to what lies between this program's result and the last one; where that does not
+ * help, either, along a kink between both iterates. */
+static int32_t step_between(rti_solver *s) {
+    double share;
+    const int32_t on_kink = s->on_kink;
+    s->on_kink = 0;
+    keep_residuals(s);
+    int32_t what = rti_between(s, &share);
+    if (what == 0 && on_kink && may_seek_kink(s) && rti_finds_kink(s, &share)) {
+        what = RTI_KINK;
+    }
+    if (what == 0) {
+        return 0;
+    }
+    if (what != RTI_KINK) {
+        const double slope = merit_slope(s, 0);
+        rti_reach(s, 1);
+        if (rti_evaluate(s, &s->trial, RTI_ALL) &&
+            (is_better(s, 1, slope) || is_nearer(s, slope))) {
+            return 1;
+        }
+    }
+    if (may_seek_kink(s) && step_along_kink(s, share)) {
+        return 1;
+    }
+    recall_first(s);
+    return 0;
+}
+
 /* Tries the step of a solved program; the part of it that was gone, 0: none. */
 static double try_step(rti_solver *s, int32_t result) {
+    const int32_t seeks = result == QP_SOLVED && s->shape.n_p == 0;
+    double share;
+    if (seeks && step_between(s)) {
+        return 1;
+    }
+    if (s->failure != MHE_OK || rti_is_over(s)) {
+        return 0;
+    }
     const double slope = merit_slope(s, result == QP_INFEASIBLE && s->shape.n_p == 0);
     rti_reach(s, 1);
     const int32_t known = rti_evaluate(s, &s->trial, RTI_ALL);
@@ -167,6 +246,13 @@ static double try_step(rti_solver *s, int32_t result) {
     }
     if (known && result == QP_SOLVED && !rti_is_over(s) && second_look(s, slope)) {
         return 1;
+    }
+    if (known && seeks && may_seek_kink(s) && rti_finds_kink(s, &share)) {
+        keep_first(s);
+        if (step_along_kink(s, share)) {
+            return 1;
+        }
+        recall_first(s);
     }
     return s->failure == MHE_OK && !rti_is_over(s) ? search(s, slope) : 0;
 }
@@ -180,6 +266,10 @@ int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
         }
         const double before = s->gap_sum;
         const double length = result == QP_FAILED ? 0 : try_step(s, result);
+        if (length > 0 && s->stays) {
+            rti_accept_multipliers(s, 1);
+            return RTI_MOVED;
+        }
         if (length > 0) {
             rti_accept(s, length);
             adapt_damping(s, length);

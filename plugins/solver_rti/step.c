@@ -113,7 +113,7 @@ static void blend(double length, size_t n, const double *to, double *from) {
     }
 }
 
-static void accept_multipliers(rti_solver *s, double length) {
+void rti_accept_multipliers(rti_solver *s, double length) {
     const size_t n = size_z(&s->shape);
     blend(length, size_x(&s->shape), s->qp.lambda, s->lambda);
     blend(length, n, s->qp.z_lower, s->z_lower);
@@ -126,7 +126,7 @@ void rti_accept(rti_solver *s, double length) {
     const rti_point old = s->here;
     s->here = s->trial;
     s->trial = old;
-    accept_multipliers(s, length);
+    rti_accept_multipliers(s, length);
 }
 
 /* Share of the parameters in it, of the step in s->slope. */
@@ -226,7 +226,7 @@ static int32_t leap(rti_solver *s, int32_t result) {
             double *const from = s->here.w;
             s->here.w = s->trial.w;
             s->trial.w = from;
-            accept_multipliers(s, leap->length);
+            rti_accept_multipliers(s, leap->length);
             return result == QP_LATE ? RTI_CUT : RTI_MOVED;
         }
     }

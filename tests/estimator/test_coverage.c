@@ -2,7 +2,8 @@
 /* Do the bands hold the truth? Of forces, nominal 95 %, with the errors that the config says.
  *
  *   test_estimator_coverage                  a slice, as a test
- *   test_estimator_coverage DRAWS REFERENCE.sto...   the table of docs/uncertainty.md */
+ *   test_estimator_coverage DRAWS REFERENCE.sto...   the table of docs/uncertainty.md
+ *   test_estimator_coverage NUMBER:DRAWS REFERENCE.sto...   one of its conditions, 0 the first */
 #include "estimator/recording.h"
 #include "fixture.h"
 #include "noise/noise.h"
@@ -35,7 +36,8 @@ static const condition conditions[] = {
 
 typedef struct count {
     double held, of;             /* forces */
-    double by_muscle[N_M], each; /* of each muscle */
+    double by_muscle[N_M], each; /* of each muscle, and squares of ... */
+    double force[N_M], error[N_M], band[N_M];
     double angles, of_angles;
     double squares, variance; /* of errors, of bands */
 } count;
@@ -47,7 +49,7 @@ static void write_config(const condition *c, char *yaml, size_t size) {
                    "output: {uncertainty: true}\n"
                    "uncertainty: {emg_noise: %g, emg_gain: %g, max_isometric_force: %g, "
                    "optimal_fiber_length: %g, tendon_slack_length: %g, path_length: 0, "
-                   "marker_noise: 1e-5, marker_offset: %g}\n",
+                   "marker_noise: 1e-5, marker_offset: %g, emg_floor: 0}\n",
                    c->emg > 0 ? 0.5 : 0, c->gain, c->strength, c->fiber, c->tendon, c->offset);
 }
 
@@ -77,6 +79,9 @@ static void compare(const mhe_estimate *e, const mhi_recording *r, const double 
         const int32_t held = fabs(error) <= 1.96 * e->force_sd[m];
         to->held += held;
         to->by_muscle[m] += held;
+        to->force[m] += truth[m] * truth[m];
+        to->error[m] += error * error;
+        to->band[m] += e->force_sd[m] * e->force_sd[m];
         to->squares += error * error;
         to->variance += e->force_sd[m] * e->force_sd[m];
     }
@@ -136,10 +141,11 @@ static void run(const condition *c, const char *reference, int32_t seed, count *
     test_fixture_close(&f);
 }
 
-static void table(int32_t draws, char **references, int32_t n) {
+static void table(int32_t only, int32_t draws, char **references, int32_t n) {
     (void)printf("%-14s %8s %8s %8s %8s %8s %10s %10s\n", "", "forces", "least", "most", "angles",
                  "", "error (N)", "band (N)");
-    for (int32_t i = 0; i < N_CONDITIONS; i++) {
+    const int32_t first = only < 0 ? 0 : only, end = only < 0 ? N_CONDITIONS : only + 1;
+    for (int32_t i = first; i < end; i++) {
         count c = {0};
         double least = 1, most = 0;
         for (int32_t draw = 0; draw < draws; draw++) {
@@ -154,10 +160,11 @@ static void table(int32_t draws, char **references, int32_t n) {
         (void)printf("%-14s %8.1f %8.1f %8.1f %8.1f %8s %10.2f %10.2f\n", conditions[i].name,
                      100 * c.held / c.of, 100 * least, 100 * most, 100 * c.angles / c.of_angles, "",
                      sqrt(c.squares / c.of), sqrt(c.variance / c.of));
-        for (int32_t m = 0; m < N_M; m++) {
-            (void)printf(" %.1f", 100 * c.by_muscle[m] / c.each);
+        for (int32_t m = 0; m < N_M; m++) { /* of each: share held, force, error and band */
+            (void)printf("    %2d %6.1f %8.1f %8.2f %8.2f\n", m, 100 * c.by_muscle[m] / c.each,
+                         sqrt(c.force[m] / c.each), sqrt(c.error[m] / c.each),
+                         sqrt(c.band[m] / c.each));
         }
-        (void)printf("\n");
         (void)fflush(stdout);
     }
 }
@@ -182,7 +189,9 @@ static void a_slice_of_the_table_holds(void **state) {
 int main(int argc, char **argv) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(a_slice_of_the_table_holds)};
     if (argc > 2) {
-        table(atoi(argv[1]), argv + 2, argc - 2);
+        const char *draws = strchr(argv[1], ':');
+        const int32_t only = draws == NULL ? -1 : atoi(argv[1]) % N_CONDITIONS;
+        table(only, atoi(draws == NULL ? argv[1] : draws + 1), argv + 2, argc - 2);
         return 0;
     }
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -48,6 +48,9 @@ mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t 
     mhi_run run = *c->start;
     run.data = m->run.data;
     mhe_status status = mhi_estimator_create_on(&run, c->model, c->host, &e, err);
+    if (status == MHE_OK) { /* first activations are held where it finds them */
+        mhi_estimator_set_seen(e);
+    }
     for (int32_t k = 0; k < m->recording->n_frames && status == MHE_OK; k++) {
         const mhe_frame frame =
             mhi_recording_frame(m->recording, c->model->n_markers, c->model->n_muscles, k);

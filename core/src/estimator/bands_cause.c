@@ -133,6 +133,12 @@ static const double *emg_of(const mhe_estimator *e, int32_t k) {
     return c == NULL || !c->read ? NULL : mhi_row(c->believed, k, c->face.width);
 }
 
+/* How much its channels varied so far; NULL: there are none. */
+static const double *varied_of(const mhe_estimator *e) {
+    const mhi_channel *c = mhi_channels_find(&e->channels, mhi_ocp_control(e->ocp));
+    return c == NULL || !c->read ? NULL : c->varied;
+}
+
 static double variation_of(const double *spread, int32_t m) {
     return spread == NULL || !(spread[m] > 0) ? UNKNOWN : spread[m];
 }
@@ -149,7 +155,7 @@ static double share_of_known(double sd) {
 static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
     const mhi_uncertainty_section *c = b->config;
     const double *emg = emg_of(e, k < e->window.n ? k : e->window.n - 1);
-    const double *spread = mhi_ocp_target_spread(e->ocp, mhi_ocp_control(e->ocp));
+    const double *spread = varied_of(e);
     for (int32_t m = 0; m < b->n_m; m++) {
         const int32_t known = emg != NULL && !isnan(emg[m]);
         const double noise = b->emg.level * c->emg_noise * variation_of(spread, m);
@@ -204,7 +210,7 @@ void mhi_bands_size(mhe_estimator *e, mhi_bands *b, int32_t k, const double *act
 
 void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
     const double *emg = emg_of(e, 0), *u = e->window.solution.u;
-    const double *spread = mhi_ocp_target_spread(e->ocp, mhi_ocp_control(e->ocp));
+    const double *spread = varied_of(e);
     const double level = b->emg.level * b->emg.level;
     double seen = 0, noise = 0, others = 0;
     for (int32_t m = 0; m < b->n_m && emg != NULL; m++) {

@@ -4,6 +4,9 @@
 #include <math.h>
 #include <string.h>
 
+#define UNSEEN 0.1     /* how much EMG may vary (of 1) of which little was seen, a variance ... */
+#define SEEN_AFTER 0.5 /* ... that falls to the e-th part within so long a look (s) */
+
 /* A row of the table before it has memory. A further quantity is a further row. */
 typedef struct row_setup {
     const char *name;
@@ -56,8 +59,9 @@ static mhe_status take_rows(mhi_channel *c, int32_t nodes, mhi_arena *arena, mhe
     c->line = MHI_TAKE(arena, double, (c->frames + 1) * width);
     c->absent = MHI_TAKE(arena, double, width);
     c->found = MHI_TAKE(arena, double, width);
+    c->varied = MHI_TAKE(arena, double, width);
     if (!c->measured || !c->believed || !c->why || !c->late || !c->sums || !c->n_in_mean ||
-        !c->line || !c->absent || !c->found) {
+        !c->line || !c->absent || !c->found || !c->varied) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     for (ptrdiff_t i = 0; i < width; i++) {
@@ -176,6 +180,7 @@ void mhi_channels_free(mhi_channels *channels) {
 void mhi_channels_set_interval(mhi_channels *channels, double interval, int32_t ratio) {
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_channel *c = &channels->rows[i];
+        c->interval = interval;
         c->face.gap = c->gap_nodes * interval;
         c->span = c->face.gap_rule == MHE_GAP_MEAN ? interval : 0;
         c->face.delay = c->frames * interval / ratio;
@@ -290,7 +295,10 @@ void mhi_channel_spread(mhi_channel *c, int32_t filled, double *spread) {
     }
     for (int32_t i = 0; i < width; i++) {
         const double n = now[i], mean = now[width + i] / n;
-        spread[i] = n > 0 ? sqrt(fmax(0, now[2 * width + i] / n - mean * mean)) : NAN;
+        const double square = n > 0 ? fmax(0, now[2 * width + i] / n - mean * mean) : NAN;
+        const double unseen = c->seen ? 0 : UNSEEN * UNSEEN * exp(-n * c->interval / SEEN_AFTER);
+        c->varied[i] = sqrt(square);
+        spread[i] = sqrt(square + unseen);
     }
 }
 

@@ -28,19 +28,22 @@ typedef struct mhi_channel {
     int32_t read;      /* a cost reads the signal */
     int32_t frames;    /* by which what a node tracks lags behind */
     int32_t gap_nodes; /* the longest gap, in intervals */
+    int32_t seen;      /* how much it varies is what was seen so far, however little */
+    double interval;   /* s from node to node */
     double span;       /* s that a node's mean is over; 0: not known, or no mean */
 
     /* Rows of the window's nodes, oldest first. */
     double *measured;        /* [nodes x width] */
     double *believed;        /* the same, NaN where trust.c does not believe it: the targets */
-    int32_t *why;            /* [nodes x width] MHE_TRACK_* */
     double misfit, n_misfit; /* sum of squares of how far estimates were from it; of how many */
+    int32_t *why;            /* [nodes x width] MHE_TRACK_* */
     double *sums;  /* [6 x width] over nodes that have left the window; and with those in it */
     uint8_t *late; /* [nodes x width] 0: it came with the frame, which nothing later changes */
 
     int32_t *n_in_mean;     /* [width] frames in the newest node's mean */
     double *line;           /* [(frames+1) x width] of the last frames */
     double *absent, *found; /* [width] all missing; scratch */
+    double *varied;         /* [width] standard deviation so far */
     mhi_samples samples;
     mhe_channel_counts counts;
 } mhi_channel;
@@ -75,8 +78,9 @@ void mhi_channel_set(mhi_channel *channel, int32_t k, const double *values);
 void mhi_channel_add(mhi_channel *channel, int32_t k, const double *values);
 /* All nodes are believed again. */
 void mhi_channel_believe(mhi_channel *channel, int32_t nodes);
-/* Standard deviation [width] of all that was measured so far, with the `filled` nodes of the
- * window; NaN: nothing was. */
+/* How much the channel varies [width], NaN: nothing was measured: the standard deviation of all so
+ * far, with the `filled` nodes of the window, which is kept as `varied`, and while little was seen
+ * what it may vary by. Else a silent channel would be believed to the last at the start. */
 void mhi_channel_spread(mhi_channel *channel, int32_t filled, double *spread);
 /* Counts how far an estimate [width] is from what was believed; missing entries do not count. */
 void mhi_channel_compare(mhi_channel *channel, const double *estimated, const double *believed);

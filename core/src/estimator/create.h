@@ -35,6 +35,9 @@ void mhi_estimator_set_state(mhe_estimator *estimator, const double *x);
 void mhi_estimator_set_node(mhe_estimator *estimator, int32_t node); /* output.node */
 void mhi_estimator_set_deadline(mhe_estimator *estimator, double seconds);
 void mhi_estimator_set_outlier(mhe_estimator *estimator, double distance);
+/* EMG counts as varying by what was seen of it, also at the start: of a recording whose electrodes
+ * are known to work. */
+void mhi_estimator_set_seen(mhe_estimator *estimator);
 /* The next push obeys `grant` (and mhe_estimator_prepare before it), whatever the clock says; NULL:
  * as ever. What the last push was granted. */
 void mhi_estimator_grant(mhe_estimator *estimator, const mhe_grant *grant);

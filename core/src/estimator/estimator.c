@@ -347,6 +347,12 @@ void mhi_estimator_set_stop(mhe_estimator *e, const atomic_int *stop) {
     mhi_ocp_set_stop(e->ocp, stop);
 }
 
+void mhi_estimator_set_seen(mhe_estimator *e) {
+    for (int32_t i = 0; i < e->channels.n; i++) {
+        e->channels.rows[i].seen = 1;
+    }
+}
+
 void mhi_estimator_set_outlier(mhe_estimator *e, double distance) {
     e->trust.outlier = distance;
 }

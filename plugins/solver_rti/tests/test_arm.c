@@ -232,13 +232,13 @@ static void same_optimum_as_ipopt(void **state) {
 
 /* With noise the windows of the paper's curves meet their kinks: the slope of the force-velocity
  * curve changes where a muscle is at rest, and passive force jumps. An optimum may sit on a kink,
- * where one-sided derivatives vanish nowhere: then neither solver meets a tolerance (4 or 5 of the
- * 47 windows, by the last digits of the estimates that led there; with `passive_ramp` too; in 3 of
- * them a muscle rests at a stage of the integrator, to 1e-5 m/s). Or there is an optimum on either
- * side, some 1e-3 rad/s apart, and each solver finds its own from the same start (3 windows: one at
- * a muscle at rest, two at the jump, gone with the ramp). So: this solver converges wherever Ipopt
- * does; where they differ, it confirms Ipopt's optimum as one when it starts there; all objectives
- * agree. */
+ * where one-sided derivatives vanish nowhere: then Ipopt meets no tolerance (4 or 5 of the 47
+ * windows, by the last digits of the estimates that led there; with `passive_ramp` too; in 3 of
+ * them a muscle rests at a stage of the integrator, to 1e-5 m/s), and this one goes along the kink.
+ * Or there is an optimum on either side, some 1e-3 rad/s apart, and each solver finds its own from
+ * the same start (3 windows: one at a muscle at rest, two at the jump, gone with the ramp). So:
+ * this solver converges wherever Ipopt does; where they differ, it confirms Ipopt's optimum as one
+ * when it starts there; all objectives agree. */
 static void kinks_stop_both(void **state) {
     (void)state;
     tally t = {"demo", "excitation", TRACK, "paper2021", .noisy = 1, .every = 2};
