@@ -66,7 +66,8 @@ static void band(mhi_text *out, const mhi_estimated *e) {
 static void parameters_html(const report_content *r, mhi_text *out) {
     mhi_text_add(out, "<h2>Parameters</h2>\n<p>Grey: one standard deviation of what was expected; "
                       "blue: 95 %% of what was found; orange: the recordings say nothing about it. "
-                      "Muscle numbers are factors of the model's, offsets are in metres.</p>\n"
+                      "Muscle numbers, gains and masses are factors, insertions and offsets are in "
+                      "metres, delays in seconds.</p>\n"
                       "<table><tr><th>parameter</th><th>before</th><th>after</th><th>standard "
                       "deviation</th><th></th><th></th></tr>\n");
     for (int32_t i = 0; i < r->c->n; i++) {
@@ -82,11 +83,21 @@ static void parameters_html(const report_content *r, mhi_text *out) {
     mhi_text_add(out, "</table>\n");
 }
 
+#define FEW 8 /* findings that stand open */
+
 static void findings_html(const report_content *r, mhi_text *out) {
+    int32_t lines = 0;
+    for (const char *c = r->findings.data; c != NULL && *c != '\0'; c++) {
+        lines += *c == '\n';
+    }
     if (r->findings.length == 0) {
         return;
     }
-    mhi_text_add(out, "<h2>Findings</h2>\n<ul>\n");
+    mhi_text_add(out, "<h2>Findings</h2>\n");
+    if (lines > FEW) { /* the parameters' table shows most of them */
+        mhi_text_add(out, "<details><summary>%d findings</summary>\n", (int)lines);
+    }
+    mhi_text_add(out, "<ul>\n");
     for (const char *line = r->findings.data; *line != '\0';) {
         size_t n = 0;
         while (line[n] != '\n' && line[n] != '\0') {
@@ -97,7 +108,7 @@ static void findings_html(const report_content *r, mhi_text *out) {
         mhi_text_add(out, "</li>\n");
         line += n + (line[n] == '\n');
     }
-    mhi_text_add(out, "</ul>\n");
+    mhi_text_add(out, lines > FEW ? "</ul>\n</details>\n" : "</ul>\n");
 }
 
 void report_html(const report_content *r, mhi_text *out) {
@@ -120,8 +131,8 @@ void report_html(const report_content *r, mhi_text *out) {
         "parameters are informed by the recordings.</p>\n",
         (int)c->n, (int)c->n_intervals + 1, report_outcome(c), (int)c->info.iterations, c->seconds,
         (int)n_informed);
-    findings_html(r, out);
     recordings_html(r, out);
+    findings_html(r, out);
     parameters_html(r, out);
     mhi_text_add(out, "</html>\n");
 }

@@ -32,14 +32,14 @@ def rms(values):
     return math.sqrt(sum(v * v for v in values) / len(values))
 
 
-def reaction(folder):
+def reaction(folder, joint="glenohumeral", axis=AXIS):
     """Sizes (N) and angles (deg) of the humerus's reaction from the glenoid's axis, frame by frame."""
     of = table(folder / "reactions.sto")
-    name = next(n[:-2] for n in of if n.startswith(("glenohumeral", "humerus_parent_offset")) and n.endswith("in_scapula_fx"))
+    name = next(n[:-2] for n in of if n.startswith((joint, "humerus_parent_offset")) and n.endswith("in_scapula_fx"))
     sizes, angles = [], []
     for force in zip(*(of[name + axis] for axis in ("fx", "fy", "fz"))):
         size = math.sqrt(sum(f * f for f in force))
-        along = sum(f * a for f, a in zip(force, AXIS)) / math.sqrt(sum(a * a for a in AXIS))
+        along = sum(f * a for f, a in zip(force, axis)) / math.sqrt(sum(a * a for a in axis))
         if size > 0:
             sizes.append(size)
             angles.append(math.degrees(math.acos(max(-1.0, min(1.0, along / size)))))
