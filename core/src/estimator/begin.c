@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/estimator_private.h"
 
+#include <math.h>
 #include <string.h>
 
 /* Parts of a frame's time after which no posture is looked for elsewhere, and none any more. A
@@ -17,11 +18,21 @@ mhe_status mhi_begin_create(mhi_begin *b, const mhi_system *system, mhi_system_c
                      .v = MHI_TAKE(arena, double, n_q),
                      .closed = MHI_TAKE(arena, double, n_q),
                      .activation = MHI_TAKE(arena, double, mhi_system_face(system)->n_m),
+                     .range = {MHI_TAKE(arena, double, mhi_system_face(system)->n_m),
+                               MHI_TAKE(arena, double, mhi_system_face(system)->n_m)},
+                     .mean = MHI_TAKE(arena, double, mhi_system_face(system)->n_m),
+                     .torque = MHI_TAKE(arena, double, mhi_system_face(system)->n_r),
+                     .input = MHI_TAKE(arena, double, mhi_system_face(system)->n_w),
                      .near = MHI_TAKE(arena, double, n_q),
                      .distance = MHI_TAKE(arena, double, nodes)};
     if (b->q == NULL || b->v == NULL || b->closed == NULL || b->near == NULL ||
-        b->activation == NULL || b->distance == NULL) {
+        b->activation == NULL || b->distance == NULL || b->range[0] == NULL ||
+        b->range[1] == NULL || b->mean == NULL || b->torque == NULL || b->input == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    mhe_status status = mhi_statics_create(&b->statics, system, arena, err);
+    if (status != MHE_OK) {
+        return status;
     }
     mhi_begin_forget(b);
     return mhi_start_create(system, context, &b->start, err);
@@ -154,13 +165,66 @@ static void guess_velocities(mhe_estimator *e, int32_t k, double *v) {
     }
 }
 
-/* The muscles' states of node k in equilibrium with the EMG; where there is none, of a usual size.
+/* Accelerations of node k: slopes of the velocities beside it. */
+static void guess_accelerations(const mhe_estimator *e, int32_t k, double *wanted) {
+    const int32_t from = k > 0 ? k - 1 : k, to = k < e->window.n ? k + 1 : k;
+    const double *before = mhi_row(e->window.guess_x, from, e->window.n_x) + e->n_q;
+    const double *after = mhi_row(e->window.guess_x, to, e->window.n_x) + e->n_q;
+    for (int32_t i = 0; i < e->n_q; i++) {
+        wanted[i] = (after[i] - before[i]) / (e->window.times[to] - e->window.times[from]);
+    }
+}
+
+/* Muscles without EMG: what guess_means() found. */
+static void take_means(mhe_estimator *e, int32_t k, double *a) {
+    const mhi_channel *control = mhi_channels_find(&e->channels, mhi_ocp_control(e->ocp));
+    const double *emg = mhi_row(control->believed, k, e->n_m);
+    for (int32_t i = 0; i < e->n_m; i++) {
+        a[i] = isnan(emg[i]) ? e->begin.mean[i] : a[i];
+    }
+}
+
+/* Muscles without EMG take what static optimisation says of node k (`held`: they are as they are),
+ * and residual torques what is left; where it says nothing, a is as it was and the torques are 0.
  */
-static void guess_states(mhe_estimator *e, int32_t k, double *x) {
+static void guess_forces(mhe_estimator *e, int32_t k, int32_t held, double *a, double *r) {
+    const double *x = mhi_row(e->window.guess_x, k, e->window.n_x);
+    const mhi_channel *control = mhi_channels_find(&e->channels, mhi_ocp_control(e->ocp));
+    const double *emg = mhi_row(control->believed, k, e->n_m);
+    const int32_t n_w = mhi_system_face(e->system)->n_w;
+    double *lower = e->begin.range[0], *upper = e->begin.range[1], *wanted = e->begin.closed;
+    int32_t n_free = 0;
+    memset(r, 0, sizeof *r * (size_t)e->n_r);
+    for (int32_t i = 0; i < e->n_m; i++) {
+        const int32_t known = !isnan(emg[i]);
+        lower[i] = known || held ? a[i] : e->run->bounds.activation_min + 0.01;
+        upper[i] = known || held ? a[i] : e->run->bounds.activation_max - 0.01;
+        n_free += !known;
+    }
+    if (n_free == 0 || mhi_system_context_spent(mhi_ocp_context(e->ocp))) {
+        return;
+    }
+    if (n_w > 0) {
+        memcpy(e->begin.input, mhi_ocp_input(e->ocp, k), sizeof(double) * (size_t)n_w);
+        (void)mhi_system_inputs(e->system, e->window.times[k], e->begin.input, NULL);
+    }
+    guess_accelerations(e, k, wanted);
+    if (mhi_statics_solve(&e->begin.statics, mhi_ocp_context(e->ocp), x, x + e->n_q,
+                          n_w > 0 ? e->begin.input : NULL, wanted, lower, upper, a, r) != 0) {
+        memset(r, 0, sizeof *r * (size_t)e->n_r);
+        return;
+    }
+    const double *least = mhi_ocp_u_lower(e->ocp, 0), *most = mhi_ocp_u_upper(e->ocp, 0);
+    for (int32_t i = 0; i < e->n_r; i++) {
+        r[i] = mhi_clip(r[i], least[e->n_m + i], most[e->n_m + i]);
+    }
+}
+
+/* The muscles' states in equilibrium with their activations; where there is none, of a usual size.
+ */
+static void guess_states(mhe_estimator *e, const double *a, double *x) {
     const mhe_layout *layout = mhi_system_face(e->system)->layout;
-    guess_controls(e, k, e->begin.activation);
-    if (mhi_system_equilibrium(mhi_ocp_context(e->ocp), x, x + e->n_q, e->begin.activation, x,
-                               NULL) == MHE_OK) {
+    if (mhi_system_equilibrium(mhi_ocp_context(e->ocp), x, x + e->n_q, a, x, NULL) == MHE_OK) {
         return;
     }
     for (int32_t b = 0; b < layout->n_blocks; b++) {
@@ -173,16 +237,40 @@ static void guess_states(mhe_estimator *e, int32_t k, double *x) {
     }
 }
 
-/* Velocities by slopes, muscles by the EMG. */
-static void guess_rest(mhe_estimator *e) {
+/* Activations that are states cannot jump from node to node: their mean over the window. */
+static void guess_means(mhe_estimator *e) {
+    double *a = e->begin.activation, *mean = e->begin.mean;
+    memset(mean, 0, sizeof *mean * (size_t)e->n_m);
     for (int32_t k = 0; k <= e->window.n; k++) {
-        double *x = mhi_row(e->window.guess_x, k, e->window.n_x);
-        guess_velocities(e, k, x + e->n_q);
-        guess_states(e, k, x);
+        guess_controls(e, k, a);
+        guess_forces(e, k, 0, a, e->begin.torque);
+        for (int32_t i = 0; i < e->n_m; i++) {
+            mean[i] += a[i] / (e->window.n + 1);
+        }
+    }
+}
+
+/* Velocities by slopes, muscles by the EMG and by what moves the body so. */
+static void guess_rest(mhe_estimator *e) {
+    double *a = e->begin.activation, *r = e->begin.torque;
+    const int32_t states = mhi_system_face(e->system)->n_d > 0;
+    for (int32_t k = 0; k <= e->window.n; k++) {
+        guess_velocities(e, k, mhi_row(e->window.guess_x, k, e->window.n_x) + e->n_q);
+    }
+    if (states) {
+        guess_means(e);
+    }
+    for (int32_t k = 0; k <= e->window.n; k++) {
+        guess_controls(e, k, a);
+        if (states) {
+            take_means(e, k, a);
+        }
+        guess_forces(e, k, states, a, r);
+        guess_states(e, a, mhi_row(e->window.guess_x, k, e->window.n_x));
         if (k < e->window.n) {
             double *u = mhi_row(e->window.guess_u, k, e->n_u);
-            guess_controls(e, k, u);
-            memset(u + e->n_m, 0, sizeof(double) * (size_t)e->n_r);
+            memcpy(u, a, sizeof *u * (size_t)e->n_m);
+            memcpy(u + e->n_m, r, sizeof *u * (size_t)e->n_r);
         }
     }
 }

@@ -5,14 +5,20 @@
 #define MHI_BEGIN_H
 
 #include "estimator/start.h"
+#include "estimator/statics.h"
 
 #include <mhe/estimator.h>
 
 typedef struct mhi_begin {
-    mhi_start *start;   /* postures from markers */
-    double *q, *v;      /* known first state [n_q], NaN where free */
-    double *closed;     /* [n_q] scratch */
+    mhi_start *start; /* postures from markers */
+    double *q, *v;    /* known first state [n_q], NaN where free */
+    double *closed;   /* [n_q] scratch */
+    mhi_statics statics;
     double *activation; /* [n_m] of a node, guessed */
+    double *range[2];   /* [n_m] of the activations, scratch */
+    double *mean;       /* [n_m] of the activations over the window */
+    double *torque;     /* [n_r] of a node, guessed */
+    double *input;      /* [n_w] scratch */
     double *near;       /* [n_q] scratch */
     double *distance;   /* [n+1] of the markers at each node */
     int32_t n_q;
