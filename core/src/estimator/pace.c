@@ -23,12 +23,15 @@
  * then the frames behind it go on looking for, in slices of what there is for LATER; when that is
  * used up, too, the beginning rests: each frame gives back a little, and when WAKE is there the
  * window begins anew from its measurements. So a beginning that takes long takes several frames, a
- * recording that goes wrong at first is not lost, and one that is wrong costs little. A settled
+ * recording that goes wrong at first is not lost, and one that is wrong costs little. Where muscles
+ * have states of their own (tendons, whose lengths nothing measures) all of it is STATES times as
+ * much: their first windows take up to four times the iterations. A settled
  * window whose usual frame is not known yet may take LEAST in any case. All of them are parts of
  * the first. */
 #define FIRST 12000.0
 #define PLAIN 40.0
 #define DEARER 4.0
+#define STATES 4.0
 #define LATER 0.5
 #define SLICE 0.05
 #define REFILL 0.0015
@@ -59,16 +62,21 @@ static int32_t look(void *estimator) {
     return mhi_pace_late(estimator, 0);
 }
 
+static double first_work(const mhe_estimator *e) {
+    const int32_t own = mhi_system_face(e->system)->n_z > 0;
+    return (own ? STATES : 1) * FIRST * e->window.n;
+}
+
 void mhi_pace_create(mhe_estimator *e) {
     mhi_pace *p = &e->pace;
-    p->all_first = p->first = FIRST * e->window.n;
+    p->all_first = p->first = first_work(e);
     p->later = LATER * p->all_first;
 }
 
 void mhi_pace_measure(mhe_estimator *e) {
     mhi_pace *p = &e->pace;
     const int64_t before = mhi_work_done(mhi_ocp_work(e->ocp));
-    if (p->n_frames > 0 || p->all_first > FIRST * e->window.n) {
+    if (p->n_frames > 0 || p->all_first > first_work(e)) {
         return;
     }
     mhi_pace_tick(e);
