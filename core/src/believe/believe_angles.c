@@ -7,9 +7,9 @@
 #include <string.h>
 
 #define DEGREE (MHI_PI / 180)
-#define SLACK 0.1         /* rad or m: so far people move beyond a model's range */
-#define OFTEN 0.05        /* share of the frames */
-#define FULL_TURN 6.3     /* no joint moves further, in rad */
+#define SLACK 0.1     /* rad or m: so far people move beyond a model's range */
+#define OFTEN 0.05    /* share of the frames */
+#define FULL_TURN 6.3 /* no joint moves further, in rad */
 
 typedef struct span {
     double low, high;
