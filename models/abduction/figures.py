@@ -70,12 +70,24 @@ def figures(folder, emg_of=None):
     return out
 
 
+def fail(line):
+    print("figures.py: " + line, file=sys.stderr)
+    sys.exit(2)
+
+
 def main():
     arguments = [a for a in sys.argv[1:] if a != "--json"]
-    emg_of = arguments[arguments.index("--emg") + 1] if "--emg" in arguments else None
-    if not arguments or arguments[0].startswith("-"):
-        sys.exit(__doc__)
-    out = figures(arguments[0], emg_of)
+    emg_of = None
+    if len(arguments) == 3 and arguments[1] == "--emg":
+        emg_of = arguments[2]
+    elif len(arguments) != 1 or arguments[0].startswith("-"):
+        fail("usage: figures.py RESULTS [--emg WITH_EMG] [--json]")
+    try:
+        out = figures(arguments[0], emg_of)
+    except OSError as e:
+        fail(f"{e.filename}: {e.strerror}; results of a run of stability.yaml with output.reactions: parent are wanted")
+    except (ArithmeticError, LookupError, ValueError):
+        fail(f"{arguments[0]}: not the results of a run of stability.yaml with output.reactions: parent")
     if "--json" in sys.argv:
         print(json.dumps(out, indent=1))
         return

@@ -261,21 +261,36 @@ def model(source, arm, as_it_is):
             + "</Model>\n</OpenSimDocument>\n")
 
 
+def fail(line):
+    print("person.py: " + line, file=sys.stderr)
+    sys.exit(2)
+
+
 def main():
     arguments = sys.argv[1:]
     as_it_is = "--as-it-is" in arguments
     arm = 1.0 if as_it_is else 0.55
     if "--arm" in arguments:
         at = arguments.index("--arm")
-        arm = float(arguments[at + 1])
+        try:
+            arm = float(arguments[at + 1])
+        except (IndexError, ValueError):
+            arm = math.nan
+        if not 0 < arm < math.inf:
+            fail("--arm: a factor above 0, as 0.55")
         del arguments[at:at + 2]
     arguments = [a for a in arguments if a != "--as-it-is"]
     if len(arguments) != 2:
-        sys.exit(__doc__)
-    with open(arguments[0]) as f:
-        source = f.read()
-    with open(arguments[1], "w") as f:
-        f.write(model(source, arm, as_it_is))
+        fail("usage: person.py wu_scaled.bioMod person.osim [--arm FACTOR] [--as-it-is]")
+    try:
+        with open(arguments[0], encoding="utf-8") as f:
+            text = model(f.read(), arm, as_it_is)
+        with open(arguments[1], "w", encoding="utf-8") as f:
+            f.write(text)
+    except OSError as e:
+        fail(f"{e.filename}: {e.strerror}")
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        fail(f"{arguments[0]}: not the .bioMod of the recording (README.md says where it is from)")
 
 
 if __name__ == "__main__":

@@ -25,9 +25,8 @@
  * window begins anew from its measurements. So a beginning that takes long takes several frames, a
  * recording that goes wrong at first is not lost, and one that is wrong costs little. Where muscles
  * have states of their own (tendons, whose lengths nothing measures) all of it is STATES times as
- * much: their first windows take up to four times the iterations. A settled
- * window whose usual frame is not known yet may take LEAST in any case. All of them are parts of
- * the first. */
+ * much: their first windows take up to four times the iterations. A settled window whose usual
+ * frame is not known yet may take LEAST in any case. All of them are parts of the first. */
 #define FIRST 12000.0
 #define PLAIN 40.0
 #define DEARER 4.0
