@@ -414,6 +414,7 @@ def test_wrong_input():
            "exact")
     expect("twice", CONFIG.replace("[BRA, Deltoid2]", "[BRA, BRA]"), "bad.yaml:14", "BRA", "twice")
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
+    expect("EMG alone", CONFIG.replace("markers: A/markers.trc, ", ""), "bad.yaml:", "neither markers nor angles")
     expect("nothing to learn from", CONFIG.replace("reference.sto}", "reference.sto, hold_out: true}"), "bad.yaml", "learn")
     with open("B/markers.trc") as file:  # another person's forearm: the last two markers 20 % farther from the one before
         lines = file.read().split("\n")

@@ -175,8 +175,17 @@ static mhe_status read_recordings(mhi_run *run, mhi_registry *registry, const mh
         }
     }
     int32_t n = 0;
-    for (int32_t i = 0; i < plan->n_recordings; i++) {
-        n += !plan->recordings[i].hold_out;
+    for (int32_t i = 0; i < plan->n_recordings && status == MHE_OK; i++) {
+        const mhi_plan_recording *r = &plan->recordings[i];
+        n += !r->hold_out;
+        if (r->markers == NULL && r->angles == NULL) {
+            status = mhi_fail_at(err, MHE_E_CONFIG, run->tree,
+                                 r->node != NULL ? r->node
+                                                 : mhi_node_find(mhi_tree_root(run->tree), "data"),
+                                 "calibrate: recording %d has neither markers nor angles: its "
+                                 "motion is not known",
+                                 (int)i + 1);
+        }
     }
     return status == MHE_OK && n == 0
                ? mhi_fail_at(err, MHE_E_CONFIG, run->tree, list,
