@@ -87,6 +87,7 @@ mhe_status live_rig_run(live_rig *r) {
         directed = r->director != NULL && pthread_create(&thread, NULL, r->director, r->data) == 0;
         status = mhe_live_run(r->live, r->seconds, &r->err);
     }
+    atomic_store(&r->over, 1);
     if (directed) {
         (void)pthread_join(thread, NULL);
     }

@@ -9,6 +9,7 @@
 #include <mhe/library.h>
 #include <mhe/live.h>
 #include <pthread.h>
+#include <stdatomic.h>
 
 /* A folder of the test's own; "" where none can be made. Removed by live_rig_clean. */
 const char *live_rig_folder(void);
@@ -36,8 +37,9 @@ typedef struct live_rig {
     void *(*director)(void *data);
     void *data;
     live_words words;
-    mhe_live *live; /* while it runs */
-    char *summary;  /* JSON; free by mhe_free */
+    mhe_live *live;  /* while it runs, and until the director has returned */
+    atomic_int over; /* the run has ended; its sinks are still there */
+    char *summary;   /* JSON; free by mhe_free */
     mhe_error err;
 } live_rig;
 

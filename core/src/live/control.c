@@ -16,6 +16,7 @@ static mhe_status ask(mhe_live *l, const mhi_live_request *r, mhe_error *err) {
         l->requests[l->n_requests++] = *r;
     }
     (void)pthread_mutex_unlock(&l->mutex);
+    mhi_mailbox_wake(l->box); /* it is served at once, whatever comes or does not */
     return status;
 }
 

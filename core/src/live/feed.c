@@ -264,8 +264,8 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
     const int32_t is_driver = in == &f->inlets[f->driver];
     const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
     in->newest = smooth;
+    in->n_samples++;
     if (in->is_raw) { /* on the host's time: there may be no frame yet */
-        in->n_samples++;
         mhi_electrodes_push(in->electrodes, smooth, values);
         return MHE_OK;
     }
@@ -276,7 +276,6 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
         f->start = smooth;
     }
     const double time = smooth - f->start;
-    in->n_samples++;
     mhi_inlet_take(in, f->setup.run, values);
     return is_driver ? push_frame(f, in, time, grant, err)
                      : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);

@@ -25,9 +25,10 @@ typedef struct mhi_inlet {
     int32_t is_raw;             /* EMG of electrodes */
     mhi_electrodes *electrodes; /* where is_raw; its own */
     mhi_stamp stamp;
-    double delay;  /* s, of the source */
-    double newest; /* s of CLOCK_MONOTONIC, its newest sample; -inf: none */
-    int64_t n_samples, n_zero;
+    double delay;      /* s, of the source */
+    double newest;     /* s of CLOCK_MONOTONIC, its newest sample; -inf: none */
+    int64_t n_samples; /* that came while the run ran */
+    int64_t n_zero;
     int32_t lost;             /* the source says that it sends nothing */
     char **missing, **unused; /* labels, for whoever looks; NULL-terminated */
 } mhi_inlet;
