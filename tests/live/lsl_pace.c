@@ -41,10 +41,17 @@ void lsl_pace_wait(lsl_pace *pace) {
 
 void lsl_pace_sent(lsl_pace *pace, int stream, int n) {
     if (pace != NULL) {
-        const long long all = atomic_fetch_add(&pace->sent[stream], n) + n;
-        while (atomic_load(&pace->taken[stream]) < all) {
+        atomic_fetch_add(&pace->sent[stream], n);
+    }
+}
+
+void lsl_pace_before_frame(lsl_pace *pace, long long frame) {
+    for (int i = 0; pace != NULL && i < LSL_PACE_STREAMS; i++) {
+        long long *before = &pace->before[frame % LSL_PACE_AHEAD][i];
+        while (frame >= LSL_PACE_AHEAD && atomic_load(&pace->taken[i]) < *before) {
             lsl_rig_rest(LOOK);
         }
+        *before = atomic_load(&pace->sent[i]);
     }
 }
 

@@ -1,14 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* lsl_pace.h: a sender in a process of its own that waits for the run. It sends by the clock, but
- * nothing before the run has taken what came before, so that samples are taken in the order in
- * which they leave and as fast as the run can, whatever the machine, the build and the load. What
- * is looked for is then strict: no sample is ever late but by what the sender means to be late. */
+ * no frame before the run has taken all that left before the LSL_PACE_AHEAD frames ahead of it. So
+ * the pace is what the run keeps up with, whatever the machine, the build and the load, and no
+ * sample is late by more than the sender means and these few frames: what is looked for is strict.
+ */
 #ifndef TEST_LSL_PACE_H
 #define TEST_LSL_PACE_H
 
 #include <mhe/live.h>
 #include <pthread.h>
 #include <stdatomic.h>
+
+#define LSL_PACE_AHEAD 3
 
 enum { LSL_PACE_MARKERS, LSL_PACE_EMG, LSL_PACE_STREAMS };
 
@@ -17,6 +20,7 @@ typedef struct lsl_pace {
     atomic_int go;                       /* the sender may begin */
     atomic_llong sent[LSL_PACE_STREAMS]; /* samples since then */
     atomic_llong taken[LSL_PACE_STREAMS];
+    long long before[LSL_PACE_AHEAD][LSL_PACE_STREAMS]; /* sent before the last frames */
 } lsl_pace;
 
 /* NULL: there is none, and with `create` none can be made. */
@@ -25,9 +29,9 @@ void lsl_pace_unmap(lsl_pace *pace);
 
 /* ---- the sender's side; a pace of NULL waits for nothing ---- */
 
-void lsl_pace_wait(lsl_pace *pace); /* until it may begin */
-/* n samples of a stream have left: until the run has taken them. */
-void lsl_pace_sent(lsl_pace *pace, int stream, int n);
+void lsl_pace_wait(lsl_pace *pace);                          /* until it may begin */
+void lsl_pace_sent(lsl_pace *pace, int stream, int n);       /* n samples of a stream have left */
+void lsl_pace_before_frame(lsl_pace *pace, long long frame); /* until that frame may leave */
 
 /* ---- the run's side: a thread that asks the run what it has taken ---- */
 

@@ -97,6 +97,7 @@ static void play(sender *s) {
             lsl_rig_rest(start + at - lsl_rig_now());
         }
         if (next <= due) {
+            lsl_pace_before_frame(s->pace, frame);
             send_frame(s, frame++, start + next + clock);
         } else {
             send_packet(s, sample, start + clock);

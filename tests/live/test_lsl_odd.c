@@ -13,7 +13,6 @@
 
 #define RECORDING MHE_TEST_SOURCE_DIR "/models/arm19/demo_recording.c3d"
 #define EXTRA 40 /* channels of nobody */
-#define PATIENCE 100.0
 
 enum { NOTHING, INTEGERS, NUMBERS, NO_NUMBERS, WORDS, END };
 
@@ -21,14 +20,6 @@ static lsl_rig rig;
 static mhe_table_info markers = {.size = sizeof markers}, emg = {.size = sizeof emg};
 
 static live_rig run;
-
-static double state(const char *key) { /* 0: nothing is known yet */
-    char *json = NULL;
-    const int known = mhe_live_state(run.live, &json, NULL) == MHE_OK && strstr(json, key) != NULL;
-    const double value = known ? live_rig_number(json, key) : 0;
-    mhe_free(json);
-    return value;
-}
 
 /* ---- the sender: a thread that sends as it is told, 100 times a second ---- */
 
@@ -38,7 +29,7 @@ static atomic_int wanted, sent; /* what; how many frames by the sender that is t
 
 /* Whether the run is too far behind. What left before it listened was never taken. */
 static int is_ahead(double before, double *unheard) {
-    const double taken = state("frames") - before, left = atomic_load(&sent) - taken;
+    const double taken = live_rig_state(&run, "frames") - before, left = atomic_load(&sent) - taken;
     *unheard = taken <= 0 || left < *unheard ? left : *unheard;
     return left - *unheard > AHEAD;
 }
@@ -99,7 +90,7 @@ static void *send(void *data) {
                 rig.lsl.destroy_outlet(outlet);
             }
             atomic_store(&sent, 0);
-            before = state("frames");
+            before = live_rig_state(&run, "frames");
             outlet = next == NOTHING ? NULL : open_markers(next);
         }
         how = next;
@@ -154,20 +145,12 @@ static const char config[] =
 
 static const char *missed;
 
-/* Waits until `more` frames were taken, and those that may be under way. */
-static int frames(int32_t more) {
-    const double enough = state("frames") + (more > 0 ? AHEAD + more : 0),
-                 until = lsl_rig_now() + PATIENCE;
-    while (!(state("frames") >= enough) && lsl_rig_now() < until) {
-        lsl_rig_rest(0.05);
-    }
-    return state("frames") >= enough;
-}
-
+/* Until `more` frames were taken, and those that may be under way. */
 static void step(int how, const char *said, int32_t times, int32_t more, const char *what) {
     if (missed == NULL) {
         atomic_store(&wanted, how);
-        if ((said != NULL && !live_words_wait(&run.words, said, times)) || !frames(more)) {
+        if ((said != NULL && !live_words_wait(&run.words, said, times)) ||
+            !live_rig_wait_frames(&run, more > 0 ? AHEAD + more : 0)) {
             missed = what;
         }
     }

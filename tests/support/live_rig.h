@@ -47,6 +47,11 @@ mhe_status live_rig_run(live_rig *rig);
 
 double live_rig_number(const char *json, const char *key); /* the first of that name */
 
+/* For directors: the same of the run's state; 0 where nothing is known yet. */
+double live_rig_state(live_rig *rig, const char *key);
+/* Waits until the run has taken `more` frames from now on; 0: it never did. */
+int live_rig_wait_frames(live_rig *rig, int32_t more);
+
 /* Runs, and fails the test where the run does. */
 void live_rig_must_run(live_rig *rig);
 

@@ -228,6 +228,9 @@ mhe_status mhi_live_take(mhe_live *l, mhi_packet *p, mhe_error *err) {
         mhi_packet_free(p);
         return MHE_E_MEMORY;
     }
+    for (int32_t k = 0; k < p->n_maxima && l->feed.running; k++) {
+        mhi_live_take_mvc(l, p->maxima[k].channel, p->maxima[k].value);
+    }
     if (l->feed.running || p->kind == MHI_PACKET_STREAM) {
         record_packet(l, p);
     }
