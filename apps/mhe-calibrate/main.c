@@ -78,7 +78,7 @@ static mhe_status read_run(const arguments *a, const mhe_host *host, mhi_registr
     const char **set = MHI_TAKE(&arena, const char *, a->set.n + 3);
     mhe_status status = mhi_run_read(a->config, a->set.values, a->set.n, registry, run, err);
     if (status == MHE_OK) {
-        status = mhi_plan_read(*run, &plan, err);
+        status = mhi_plan_read(*run, registry, &plan, err);
     }
     if (status == MHE_OK && set == NULL) {
         status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
@@ -239,7 +239,7 @@ static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *re
     mhi_calibration c = {.progress = NULL};
     mhe_status status = read_run(a, host, registry, &run, &start, err);
     if (status == MHE_OK) {
-        status = mhi_calibration_open(run, start, host, &c, err);
+        status = mhi_calibration_open(run, start, registry, host, &c, err);
         c.progress = show;
         c.data = a;
     }

@@ -44,6 +44,7 @@ void hill_published_geometry(const mhe_muscle *muscle, const struct hill_config 
                              struct hill_muscle *out) {
     double vmax = config->vmax > 0 ? config->vmax : hill_or(muscle->max_contraction_velocity, 10);
     out->speed = out->inverse / vmax;
+    out->speed_o = -out->speed * out->inverse;
     out->damping = config->damping >= 0 ? config->damping : hill_or(muscle->fiber_damping, 0);
     out->height = muscle->optimal_fiber_length * sin(hill_or(muscle->pennation_angle, 0));
     out->inv_cos = out->pull = 1; /* where the height is 0 */
@@ -211,7 +212,6 @@ static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *from
                                from->tendon_force_length, from->force_velocity};
         m->file = &hill->file[i];
     }
-    hill->unpublished += !set->published;
     set->prepare(from, config, m);
     m->passive_scale *= config->passive;
     hill->rate_act[i] =

@@ -31,7 +31,7 @@ def write(name, text):
         file.write(text)
 
 
-def make_motion(name, seed, least):
+def make_motion(name, seed, least, more=""):
     """Postures at random, followed with the least excitation above `least`."""
     r = random.Random(seed)
     low, high = [-0.4, -1.4, -0.6, 0.1], [0.3, -0.2, 0.4, 1.6]
@@ -42,7 +42,7 @@ def make_motion(name, seed, least):
     write(name + "_postures.sto", "postures\nnRows=%d\nnColumns=5\ninDegrees=no\nendheader\ntime\tArm_RotY\tArm_RotX\t"
           "Arm_RotY2\tLowerArm1_RotZ\n%s\n" % (len(rows), "\n".join("\t".join("%.4f" % x for x in [t] + q) for t, q in rows)))
     write(name + ".yaml", "model: {file: %s}\nmuscle: {curves: degroote2016}\nhorizon: {window: 7, ratio: 1}\n"
-          "bounds: {excitation_min: %g}\ncosts: [mhe.cost.min-excitation]\nsolver: mhe.solver.rti\n" % (ARM, least))
+          "bounds: {excitation_min: %g}\ncosts: [mhe.cost.min-excitation]\nsolver: mhe.solver.rti\n%s" % (ARM, least, more))
     done = run(SIM, "follow", name + ".yaml", "--input", name + "_postures.sto", "--out", name)
     assert done.returncode == 0, done.stderr
 
@@ -224,6 +224,104 @@ def test_scales_first():
     expect("no setup", CONFIG.replace("calibrate:", "calibrate:\n  scale: absent.xml"), "absent.xml")
 
 
+WEIGHT = """<OpenSimDocument Version="40000"><ExternalLoads name="hand"><objects><ExternalForce name="weight">
+<applied_to_body>%s</applied_to_body><force_expressed_in_body>ground</force_expressed_in_body>
+<point_expressed_in_body>hand</point_expressed_in_body><force_identifier>f</force_identifier><point_identifier>p</point_identifier>
+</ExternalForce></objects><datafile>weight.sto</datafile></ExternalLoads></OpenSimDocument>
+"""
+
+
+def write_weight(newtons, seconds):
+    """A weight in the hand, down along the ground's z."""
+    row = "\t0\t0\t%g\t0\t-0.05\t0\n" % -newtons
+    write("weight.sto", "weight\nversion=1\nnRows=2\nnColumns=7\ninDegrees=no\nendheader\ntime\tfx\tfy\tfz\tpx\tpy\tpz\n0%s%g%s" %
+          (row, seconds, row))
+    write("weight.xml", WEIGHT % "hand")
+
+
+def test_loaded():
+    """A recording with a known weight in the hand, beside one without: the weight acts in its own recording alone."""
+    write_weight(20, 3)
+    make_motion("L", 2, 0.15, "data: {external_loads: weight.xml}\n")
+    make_person("L")
+    loaded = CONFIG.replace("markers: B/", "markers: L/").replace("emg: B_", "emg: L_").replace(
+        "B/reference.sto", "L/reference.sto, external_loads: weight.xml")
+    forces = {}
+    for name, config in (("loaded", loaded), ("weightless", loaded.replace(", external_loads: weight.xml", ""))):
+        write("loaded.yaml", config)
+        done = run(CALIBRATE, "loaded.yaml", "--out", name, "--quiet")
+        assert done.returncode == 0, done.stderr
+        with open(name + "/calibration.json") as file:
+            told = json.load(file)
+        assert told["outcome"] == "converged", (name, told["outcome"])
+        forces[name] = [(r["before"]["force_n"], r["after"]["force_n"]) for r in told["recordings"]]
+        with open(name + "/parameters.csv") as file:
+            rows = {row["parameter"]: row for row in csv.DictReader(file)}
+        for muscle, factor in STRONGER.items():
+            row = rows["max_isometric_force of " + muscle]
+            off = abs(float(row["after"]) - factor) / float(row["sd"])
+            assert muscle != "BRA" or (off < 2 if name == "loaded" else off > 10), (name, off, row)
+            assert name != "loaded" or off < 2, (off, row)
+    assert all(after < 0.1 * before for before, after in forces["loaded"]), forces
+    assert forces["weightless"][1][1] > 5 * forces["loaded"][1][1], forces  # the weight taken for weakness
+    # Before all recordings, alone, and from the data section.
+    alone = re.sub(r"    - \{markers: [AL].*\n", "", loaded).replace(
+        "calibrate:", "data: {markers: L/markers.trc, emg: L_emg.sto, external_loads: weight.xml}\ncalibrate:", 1)
+    write("alone.yaml", alone)
+    done = run(CALIBRATE, "alone.yaml", "--out", "alone", "--quiet", "--set", "calibrate.max_iterations=1")
+    assert done.returncode == 0, done.stderr
+    with open("alone/calibrated.yaml") as file:
+        assert "weight.xml" in file.read()  # and mhe-run estimates with it
+    write_weight(20, 1)  # it ends before the motion does: told before the search, held out or not
+    expect("short loads", loaded, "weight.xml", "0 to 1 s", "L/markers.trc", "0 to 2 s")
+    expect("short held-out loads", loaded.replace("hold_out: true", "hold_out: true, external_loads: weight.xml").replace(
+        "L/reference.sto, external_loads: weight.xml", "L/reference.sto"), "weight.xml", "0 to 1 s", "C/markers.trc")
+    write("weight.xml", WEIGHT % "hnad")
+    expect("a load on no body", loaded, "weight.xml", "hnad")
+    expect("no loads", loaded.replace("weight.xml", "wieght.xml"), "wieght.xml")
+
+
+WALK = """model: {file: weaker.osim, unsupported: warn, paths: fitted, locked_at: {lumbar_extension: -0.4}}
+formulation: activation
+data:
+  markers: %(walk)s_markers.trc
+  emg: %(walk)s_emg.sto
+  emg_delay: 0
+  external_loads: %(walk)s_loads.xml
+  reference: %(walk)s_reference.sto
+horizon: {window: 7, ratio: 1}
+bounds: {residual_torques: true, residual_torque_max: 1000}
+integrator: {plugin: mhe.integrator.rk, scheme: gauss, stages: 1, max_step: 0.02, tolerance: 0}
+costs: [{plugin: mhe.cost.emg-markers, emg_spread: 0.1, residual_torque: 3}]
+calibrate: {noise_time: 0.05, parameters: [{name: max_isometric_force, muscles: [%(muscles)s]}]}
+"""
+
+
+def test_walks():
+    """Strengths of legs from a walk under the ground's reaction; the known motion has residual forces of 3 N."""
+    weaker = {"soleus_r": 1.3, "gastroc_r": 0.75, "vasti_r": 1.25, "glut_max_r": 0.8}
+    folder = os.path.join(SOURCE, "models", "gait10dof")
+    with open(os.path.join(folder, "subject01.osim")) as file:
+        text = file.read()
+    for name, factor in weaker.items():
+        text = re.sub(r'(Muscle name="%s">.*?<max_isometric_force>)([^<]+)' % name,
+                      lambda m: m.group(1) + "%.10g" % (float(m.group(2)) / factor), text, count=1, flags=re.S)
+    write("weaker.osim", text)
+    write("walk.yaml", WALK % {"walk": os.path.join(folder, "demo_walk"), "muscles": ", ".join(weaker)})
+    done = run(CALIBRATE, "walk.yaml", "--out", "walk", "--quiet")
+    assert done.returncode == 0, done.stderr
+    with open("walk/calibration.json") as file:
+        told = json.load(file)
+    assert told["outcome"] == "converged", told["outcome"]
+    forces = told["recordings"][0]
+    assert forces["after"]["force_n"] < 0.6 * forces["before"]["force_n"], forces  # with the true strengths: the same
+    with open("walk/parameters.csv") as file:
+        rows = {row["parameter"]: row for row in csv.DictReader(file)}
+    for name, factor in weaker.items():
+        row = rows["max_isometric_force of " + name]
+        assert abs(float(row["after"]) - factor) < 2 * float(row["sd"]) < 0.45, (name, row)
+
+
 def test_solvers_agree():
     """The bordered recursion against Ipopt on a short recording whose controls stay off their bounds (where Ipopt's are relaxed)."""
     found = []  # both until the objective does not change: a part of 1e-12 of it is 1e-7 of a gain
@@ -340,6 +438,8 @@ def main():
         make_person("ABC")
         test_finds()
         test_where_and_when()
+        test_loaded()
+        test_walks()
         test_scales_first()
         test_solvers_agree()
         test_told()

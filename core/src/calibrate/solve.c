@@ -68,18 +68,11 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhi_run *run = c->run;
     const char *names[5];
     int32_t n_names = 0;
-    mhi_force_setup *forces = MHI_TAKE(&c->arena, mhi_force_setup, run->forces.n + 1);
-    if (forces == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    for (int32_t i = 0; i < run->forces.n; i++) {
-        forces[i] = (mhi_force_setup){run->forces.uses[i].plugin, run->forces.uses[i].config};
-    }
-    if (run->external_loads.plugin != NULL) {
-        return mhe_fail(err, MHE_E_UNSUPPORTED,
-                        "%s: data.external_loads: recordings with external loads cannot be "
-                        "calibrated from",
-                        run->path);
+    mhi_force_setup *forces = NULL;
+    int32_t n_forces = 0;
+    mhe_status status = mhi_motion_forces(c, &forces, &n_forces, err);
+    if (status != MHE_OK) {
+        return status;
     }
     for (int32_t i = MHI_OF_STRENGTH; i <= MHI_OF_SLACK; i++) {
         if (c->asked[i]) {
@@ -100,7 +93,7 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                            "model.paths: where insertions are estimated paths must be exact");
     }
     mhi_bounds bounds;
-    mhe_status status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
+    status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
     const mhi_system_setup setup = {.host = c->host,
                                     .description = c->model,
                                     .model = run->model.plugin,
@@ -109,8 +102,9 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                                     .muscle_config = run->muscle.config,
                                     .formulation = run->formulation,
                                     .residual_torques = run->bounds.residual_torques,
+                                    .actuators = run->bounds.actuators,
                                     .forces = forces,
-                                    .n_forces = run->forces.n,
+                                    .n_forces = n_forces,
                                     .bounds = &bounds,
                                     .parameters = names,
                                     .n_parameters = n_names};
@@ -306,6 +300,7 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
                                       p->s.u + (ptrdiff_t)m->first * f->n_u, err);
         }
     }
+    status = status == MHE_OK ? mhi_motion_loads(c, p->system, p->ocp, err) : status;
     if (status == MHE_OK) {
         set_spread(c, p->ocp);
         status = hold_beginnings(c, p, err);
@@ -372,10 +367,10 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     return status;
 }
 
-mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_host *host,
-                                mhi_calibration *c, mhe_error *err) {
+mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry *registry,
+                                const mhe_host *host, mhi_calibration *c, mhe_error *err) {
     *c = (mhi_calibration){.run = run, .start = start, .host = host};
-    mhe_status status = mhi_plan_read(run, &c->plan, err);
+    mhe_status status = mhi_plan_read(run, registry, &c->plan, err);
     if (status == MHE_OK) {
         status = mhi_estimator_read_model(run, host, &c->model, err);
     }

@@ -98,7 +98,7 @@ static mhe_status create_problem(mhe_estimator *e, mhe_error *err) {
     }
     for (int32_t i = 0; i < n_forces; i++) {
         const mhi_use *use = i < run->forces.n ? &run->forces.uses[i] : &run->external_loads;
-        forces[i] = (mhi_force_setup){use->plugin, use->config};
+        forces[i] = (mhi_force_setup){use->plugin, use->config, NULL};
     }
     const mhi_system_setup system = {.host = e->host,
                                      .description = e->description,

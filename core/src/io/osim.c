@@ -11,6 +11,7 @@
 #include <libxml/parser.h>
 
 #define FORWARD_ONLY "controllers drive a forward simulation only"
+#define AFTER 50000 /* of versions, as files write them */
 
 /* What drives a forward simulation, and what is only computed beside it. */
 static void drop_set(mhi_osim *o, const char *set, const char *why) {
@@ -72,6 +73,9 @@ static void list_unknown(mhi_osim *o) {
         if (!mhi_xml_one_of(n, known, sizeof known / sizeof *known)) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>: left out",
                                   (const char *)n->name);
+        } else if (mhi_xml_child(o->model, (const char *)n->name) != n) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "a second <%s>: left out",
+                                  (const char *)n->name);
         } else if (*mhi_xml_attribute(o, n, "file") != '\0') {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "<%s> kept in another file",
                                   (const char *)n->name);
@@ -95,6 +99,7 @@ static void read_model(mhi_osim *o) {
     (void)mhi_xml_numbers(o, o->model, "gravity", o->b.gravity, 3);
     mhi_osim_frames(o);
     mhi_osim_bodies(o);
+    mhi_build_check_bodies(&o->b);
     mhi_osim_joints(o);
     mhi_osim_constraints(o);
     mhi_osim_obstacles(o);
@@ -105,6 +110,41 @@ static void read_model(mhi_osim *o) {
     list_components(o, mhi_xml_child(o->model, "components"));
     list_components(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"));
     list_unknown(o);
+}
+
+/* Lengths and forces are taken as they stand, whatever their units are called, as OpenSim does. */
+static void check_unit(mhi_osim *o, const char *tag, const char *const *names, size_t n) {
+    const char *unit = mhi_xml_word(o, o->model, tag);
+    size_t i = 0;
+    while (unit != NULL && i < n && !mhi_same_word(unit, names[i])) {
+        i++;
+    }
+    if (unit != NULL && i == n) {
+        mhi_build_warn(&o->b, mhi_xml_line(mhi_xml_child(o->model, tag)),
+                       "<%s> is '%s': as in OpenSim the numbers are taken as %s", tag, unit,
+                       names[0]);
+    }
+}
+
+static void check_units(mhi_osim *o) {
+    static const char *const lengths[] = {"m", "meters", "meter", "metres", "metre", "Unassigned"};
+    static const char *const forces[] = {"N", "newtons", "newton", "Unassigned"};
+    check_unit(o, "length_units", lengths, sizeof lengths / sizeof *lengths);
+    check_unit(o, "force_units", forces, sizeof forces / sizeof *forces);
+}
+
+/* How a file is read follows from its elements; the version only says what may be in it. */
+static void check_version(mhi_osim *o, const xmlNode *root) {
+    const char *text = mhi_xml_attribute(o, root, "Version");
+    double version = 0;
+    if (*text != '\0' && (!mhi_number((mhi_cell){text, strlen(text)}, &version) || version < 1)) {
+        mhi_build_warn(&o->b, mhi_xml_line(root),
+                       "Version=\"%s\" is no version of OpenSim (20302, 30000, 40000 or the like)",
+                       text);
+    } else if (version >= AFTER) {
+        mhi_build_warn(&o->b, mhi_xml_line(root),
+                       "Version=\"%s\" is newer than what is known here (below %d)", text, AFTER);
+    }
 }
 
 static void read_document(mhi_osim *o, xmlDoc *document) {
@@ -125,7 +165,15 @@ static void read_document(mhi_osim *o, xmlDoc *document) {
         mhi_build_fail(&o->b, mhi_xml_line(root), "<OpenSimDocument> holds no <Model>");
         return;
     }
+    check_version(o, root);
+    check_units(o);
     read_model(o);
+    for (xmlNode *n = mhi_xml_next(o->model); n != NULL; n = mhi_xml_next(n)) {
+        if (mhi_xml_is(n, "Model")) {
+            mhi_build_unsupported(&o->b, mhi_xml_line(n), "a second <Model> '%s': left out",
+                                  mhi_xml_name(o, n));
+        }
+    }
 }
 
 /* libxml2's message without its line end. */

@@ -57,6 +57,9 @@ static void read_coordinate(mhi_osim *o, const mhi_osim_joint *j, xmlNode *node)
     }
     draft->joint = j->name;
     draft->in_joint = name;
+    if (*draft->coordinate.name == '\0') { /* before an axis looks for it */
+        mhi_build_fail(&o->b, draft->line, "this coordinate has no name");
+    }
     (void)mhi_xml_numbers(o, node, "default_value", &draft->coordinate.value, 1);
     (void)mhi_xml_numbers(o, node, "default_speed_value", &draft->coordinate.speed, 1);
     if (mhi_xml_range(o, node, "range", range)) {

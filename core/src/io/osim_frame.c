@@ -169,7 +169,7 @@ int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int
     *body = NULL;
     *in_body = mhi_transform_identity();
     if (socket == NULL) {
-        mhi_build_fail(&o->b, line, "this element is attached to nothing");
+        mhi_build_fail(&o->b, line, "this element names no body that it is fixed to");
         return 0;
     }
     const char *path = mhi_osim_absolute(o, socket, owner), *name = last_part(path);

@@ -2,7 +2,11 @@
 /* osim_function.c: OpenSim's functions of one variable as rows of polynomial pieces. */
 #include "io/osim.h"
 
+#include <math.h>
 #include <string.h>
+
+/* Points that are nearer to each other are one point written twice, with a rounding between. */
+#define X_APART 1e-13
 
 /* The function element of a holder: named "function", within <function>, or the one child that is
  * nothing else. */
@@ -89,7 +93,8 @@ static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const 
         return 0;
     }
     for (int32_t i = 1; i < *n; i++) {
-        if (place[i] <= place[i - 1] && !repeated(o, node, whose, place, *y, i)) {
+        if (place[i] - place[i - 1] <= X_APART * fabs(place[i]) &&
+            !repeated(o, node, whose, place, *y, i)) {
             mhi_build_fail(&o->b, mhi_xml_line(node), "<%s> of %s: x does not increase at %g",
                            (const char *)node->name, whose, (*x)[i]);
             return 0;
@@ -115,10 +120,11 @@ static int32_t read_gcv(mhi_osim *o, xmlNode *node, const char *whose, mhe_funct
                               "applied",
                               whose, variance);
     }
-    if (!(half_order >= 1 && half_order <= 4) || n < 2 * (int32_t)half_order) {
+    if (!(half_order >= 1 && half_order <= 4) || half_order != floor(half_order) ||
+        n < 2 * (int32_t)half_order) {
         mhi_build_fail(&o->b, mhi_xml_line(node),
-                       "<GCVSpline> of %s: half_order %g needs to be 1 to 4, and at least twice "
-                       "as many points as that (has %d)",
+                       "<GCVSpline> of %s: half_order %g needs to be 1, 2, 3 or 4, and at least "
+                       "twice as many points as that (has %d)",
                        whose, half_order, (int)n);
         return -1;
     }
@@ -197,6 +203,15 @@ static int32_t read_element(mhi_osim *o, xmlNode *node, const char *whose, mhe_f
     for (size_t i = 0; i < sizeof readers / sizeof *readers; i++) {
         if (mhi_xml_is(node, readers[i].tag)) {
             int32_t found = readers[i].read(o, node, whose, function);
+            for (int32_t k = 0; found == 1 && k < function->n_pieces * function->n_coef; k++) {
+                if (!isfinite(function->coef[k])) {
+                    mhi_build_fail(&o->b, mhi_xml_line(node),
+                                   "<%s> of %s: its slopes are beyond any number: are two x as "
+                                   "good as the same?",
+                                   readers[i].tag, whose);
+                    break;
+                }
+            }
             return o->b.status == MHE_OK ? found : -1;
         }
     }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* osim_joint.c: bodies and the joints that carry them. */
+#include "base/text.h"
 #include "io/osim.h"
 
 #include <stdio.h>
@@ -62,13 +63,19 @@ static void build_plain(mhi_osim *o, mhi_osim_joint *j, const char *motions) {
 /* The joint's coordinate `name`; -1 after an error. */
 static int32_t joint_coordinate(mhi_osim *o, const mhi_osim_joint *j, const char *name,
                                 int32_t line) {
-    for (int32_t i = j->first; i < j->first + j->n; i++) {
-        const mhi_coordinate_draft *draft = o->b.coordinates.items[i];
-        if (strcmp(draft->coordinate.name, name) == 0) {
-            return i;
+    const char **names = mhi_build_take(&o->b, j->n, sizeof *names);
+    char hint[256] = "";
+    for (int32_t i = 0; names != NULL && i < j->n; i++) {
+        const mhi_coordinate_draft *draft = o->b.coordinates.items[j->first + i];
+        names[i] = draft->coordinate.name;
+        if (strcmp(names[i], name) == 0) {
+            return j->first + i;
         }
     }
-    mhi_build_fail(&o->b, line, "joint '%s' has no coordinate '%s'", j->name, name);
+    if (names != NULL && j->n > 0) {
+        mhi_suggest(hint, sizeof hint, name, names, j->n);
+    }
+    mhi_build_fail(&o->b, line, "joint '%s' has no coordinate '%s'%s", j->name, name, hint);
     return -1;
 }
 

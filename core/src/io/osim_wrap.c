@@ -54,9 +54,6 @@ static void read_obstacle(mhi_osim *o, xmlNode *node, const char *body, const mh
     while (kind < 4 && !mhi_xml_is(node, types[kind])) {
         kind++;
     }
-    if (kind == 4) {
-        return; /* a path that names it says so */
-    }
     mhi_obstacle_draft *draft = mhi_build_push(&o->b, &o->b.obstacles, sizeof *draft);
     if (draft == NULL) {
         return;
@@ -65,6 +62,11 @@ static void read_obstacle(mhi_osim *o, xmlNode *node, const char *body, const mh
     draft->line = mhi_xml_line(node);
     draft->active = mhi_xml_stated_flag(o, node, "active") != 0;
     draft->obstacle.name = mhi_xml_name(o, node);
+    if (kind == 4) { /* nothing is missing unless a path goes around it */
+        draft->unknown = (const char *)mhi_arena_text(&o->b.arena, (const char *)node->name);
+        draft->active = 0;
+        return;
+    }
     draft->obstacle.kind = kind;
     (void)mhi_xml_numbers(o, node, "xyz_body_rotation", angles, 3);
     (void)mhi_xml_numbers(o, node, "translation", frame.p, 3);

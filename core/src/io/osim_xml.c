@@ -180,7 +180,15 @@ int32_t mhi_xml_bound(mhi_osim *o, xmlNode *object, const char *name, double *ou
 
 int32_t mhi_xml_stated_flag(mhi_osim *o, xmlNode *object, const char *name) {
     const char *text = mhi_xml_word(o, object, name);
-    return text == NULL ? -1 : mhi_same_word(text, "true") || strcmp(text, "1") == 0;
+    if (text == NULL) {
+        return -1;
+    }
+    const int32_t yes = mhi_same_word(text, "true") || strcmp(text, "1") == 0;
+    if (!yes && !mhi_same_word(text, "false") && strcmp(text, "0") != 0) {
+        mhi_build_fail(&o->b, mhi_xml_line(mhi_xml_property(object, name)),
+                       "<%s> can be true or false, not '%s'", name, text);
+    }
+    return yes;
 }
 
 int32_t mhi_xml_flag(mhi_osim *o, xmlNode *object, const char *name) {
