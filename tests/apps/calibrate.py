@@ -178,6 +178,26 @@ def test_where_and_when():
     assert any(abs(delay - early) < 0.004 for delay in delays), delays
 
 
+def test_delay():
+    """Motions of 2 s without noise: a delay is off by less than half its standard deviation, whatever it is."""
+    config = re.sub("([ABC])_emg", r"\1_late", CONFIG).replace("model.osim", ARM)
+    for early in (0, 0.01):
+        for motion in "ABC":
+            with open(motion + "/emg.sto") as file:
+                lines = file.read().split("\n")
+            head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+            rows = [line.split("\t", 1) for line in lines[head + 1:] if line]
+            write(motion + "_late.sto", "\n".join(lines[:head + 1] + ["%.4f\t%s" % (float(row[0]) - early, row[1])
+                                                                     for row in rows]) + "\n")
+        write("delay.yaml", config[:config.index("  parameters:")] +
+              "  parameters:\n    - {name: emg_delay, together: true, lower: -0.1, mean: 0, sd: 0.1}\n")
+        done = run(CALIBRATE, "delay.yaml", "--out", "delay", "--quiet")
+        assert done.returncode == 0, done.stderr
+        with open("delay/parameters.csv") as file:
+            row = next(csv.DictReader(file))
+        assert abs(float(row["after"]) - early) < 0.5 * float(row["sd"]) < 0.0025, (early, row)
+
+
 def expect(what, config, *words):
     write("bad.yaml", config)
     done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
@@ -438,6 +458,7 @@ def main():
         make_person("ABC")
         test_finds()
         test_where_and_when()
+        test_delay()
         test_loaded()
         test_walks()
         test_scales_first()

@@ -211,12 +211,15 @@ static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junc
     }
 }
 
-/* Of a motion's first activations and fibre lengths (m), about where they were found. */
-#define FIRST_SD 0.1
+/* Of a motion's first activations and fibre lengths (m), about where they were found. Activations
+ * may be anywhere within their bounds: the estimator finds them with the wrong model, and what
+ * holds them there moves what else explains the first moments, a delay above all (by 6 ms at 0.1).
+ */
+#define FIRST_SD 1.0
 #define FIRST_LENGTH_SD 0.01
 
 /* Nothing tells the first activations of redundant muscles apart but what comes before: they stay
- * near those of the start. */
+ * near those of the start, as far as the motion says nothing of them. */
 static mhe_status hold_beginnings(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_system *f = mhi_system_face(p->system);
     double *weight = MHI_TAKE(&c->arena, double, f->n_x);

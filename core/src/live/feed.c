@@ -55,6 +55,27 @@ static void warn(const mhi_feed *f, const char *text) {
     f->setup.host->log(f->setup.host, MHE_LOG_WARNING, text);
 }
 
+/* Maxima that were found stay, whatever becomes of the stream. */
+static void keep_maxima(const mhi_feed *f, mhi_inlet *in) {
+    for (int32_t i = 0; i < f->setup.run->emg.n_channels && i < MHI_FEED_MAXIMA; i++) {
+        if (in->is_raw && in->electrodes != NULL && f->maxima[i] > 0) {
+            (void)mhi_electrodes_set_mvc(in->electrodes, f->setup.run, i, f->maxima[i]);
+        }
+    }
+}
+
+int32_t mhi_feed_set_maximum(mhi_feed *f, int32_t channel, double value) {
+    if (channel < 0 || channel >= f->setup.run->emg.n_channels || channel >= MHI_FEED_MAXIMA ||
+        !(value > 0) || !isfinite(value)) {
+        return 0;
+    }
+    f->maxima[channel] = value;
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        keep_maxima(f, &f->inlets[i]);
+    }
+    return 1;
+}
+
 /* A stream that is new, or that is another now. Two of one kind: the first is taken. */
 static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
     mhi_inlet *in = mhi_feed_inlet(f, p->source, p->stream);
@@ -92,6 +113,7 @@ static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) 
         mhi_inlet_close(in);
     }
     *in = fresh;
+    keep_maxima(f, in);
     f->clocks[in - f->inlets] = (mhi_feed_clock){.guess = INFINITY, .received = NAN};
     return MHE_OK;
 }
@@ -264,8 +286,8 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
     const int32_t is_driver = in == &f->inlets[f->driver];
     const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
     in->newest = smooth;
+    in->n_samples++;
     if (in->is_raw) { /* on the host's time: there may be no frame yet */
-        in->n_samples++;
         mhi_electrodes_push(in->electrodes, smooth, values);
         return MHE_OK;
     }
@@ -276,7 +298,6 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
         f->start = smooth;
     }
     const double time = smooth - f->start;
-    in->n_samples++;
     mhi_inlet_take(in, f->setup.run, values);
     return is_driver ? push_frame(f, in, time, grant, err)
                      : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
