@@ -54,6 +54,9 @@ static void comments_and_ampersands_that_are_no_xml(void **state) {
     assert_warned(d, "m.osim:2: '&' should be '&amp;'");
     assert_warned(d, "m.osim:4: a comment with '--' in it");
     mhi_description_free(d);
+    d = parse(DOCUMENT("<publications>A</publications><publications>B</publications>" CHAIN));
+    assert_int_equal(d->n_unsupported, 0); /* OpenCap's models */
+    mhi_description_free(d);
     /* what is wrong otherwise still is, in its line */
     assert_refused("<OpenSimDocument>\n<!-- a -- b -->\n<Model>\n</Modl></OpenSimDocument>",
                    "m.osim:4: Opening and ending tag mismatch");
@@ -109,6 +112,18 @@ static void coordinates_of_one_name(void **state) {
     assert_string_equal(d->coordinates[0].name, "rx");
     assert_string_equal(d->coordinates[1].name, "j_rx");
     assert_warned(d, "coordinate 'rx' of joint 'j' is called 'j_rx'");
+    mhi_description_free(d);
+    /* axes name the coordinates of their own joint */
+    d = parse(DOCUMENT(SET("BodySet", BODY("a", "") BODY("b", "")) SET(
+        "JointSet",
+        PIN("i", "/ground", "/bodyset/a", "rx", "") "<CustomJoint name=\"j\">" SOCKETS(
+            "/bodyset/a", "/bodyset/b") "<coordinates><Coordinate name=\"rx\"/>"
+                                        "</coordinates><SpatialTransform>"
+                                        "<TransformAxis name=\"rotation1\">"
+                                        "<coordinates>rx</coordinates><axis>1 0 0</axis>"
+                                        "</TransformAxis></SpatialTransform>"
+                                        "</CustomJoint>")));
+    assert_int_equal(d->bodies[1].motions[0].coordinate, 1);
     mhi_description_free(d);
     /* a bare name means the first, a path the one at its end */
     d = parse(DOCUMENT(

@@ -61,18 +61,40 @@ static void list_components(mhi_osim *o, xmlNode *holder) {
 /* Elements of <Model> that are read elsewhere or have no part in the mechanics; a
  * ContactGeometrySet alone makes no force, a wrap object that no path names neither. */
 static void list_unknown(mhi_osim *o) {
-    static const char *const known[] = {
-        "credits",         "publications",       "length_units",  "force_units",
-        "gravity",         "assembly_accuracy",  "Ground",        "BodySet",
-        "JointSet",        "ForceSet",           "MarkerSet",     "ConstraintSet",
-        "ControllerSet",   "ContactGeometrySet", "ProbeSet",      "ComponentSet",
-        "components",      "defaults",           "WrapObjectSet", "ModelVisualPreferences",
-        "ModelVisualizer", "show_visualizer",    "FrameSet",      "frames",
-        "notes",           "model_version",      "VisibleObject"};
+    enum { WORDS = 5 }; /* the first of them change nothing, however many there are */
+    static const char *const known[] = {"credits",
+                                        "publications",
+                                        "notes",
+                                        "model_version",
+                                        "VisibleObject",
+                                        "length_units",
+                                        "force_units",
+                                        "gravity",
+                                        "Ground",
+                                        "BodySet",
+                                        "JointSet",
+                                        "ForceSet",
+                                        "MarkerSet",
+                                        "ConstraintSet",
+                                        "ControllerSet",
+                                        "ContactGeometrySet",
+                                        "ProbeSet",
+                                        "ComponentSet",
+                                        "components",
+                                        "defaults",
+                                        "WrapObjectSet",
+                                        "FrameSet",
+                                        "show_visualizer",
+                                        "ModelVisualPreferences",
+                                        "frames",
+                                        "ModelVisualizer",
+                                        "assembly_accuracy"};
     for (xmlNode *n = mhi_xml_first(o->model); n != NULL; n = mhi_xml_next(n)) {
         if (!mhi_xml_one_of(n, known, sizeof known / sizeof *known)) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>: left out",
                                   (const char *)n->name);
+        } else if (mhi_xml_one_of(n, known, WORDS)) {
+            continue;
         } else if (mhi_xml_child(o->model, (const char *)n->name) != n) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "a second <%s>: left out",
                                   (const char *)n->name);

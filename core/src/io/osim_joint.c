@@ -67,7 +67,7 @@ static int32_t joint_coordinate(mhi_osim *o, const mhi_osim_joint *j, const char
     char hint[256] = "";
     for (int32_t i = 0; names != NULL && i < j->n; i++) {
         const mhi_coordinate_draft *draft = o->b.coordinates.items[j->first + i];
-        names[i] = draft->coordinate.name;
+        names[i] = draft->in_joint != NULL ? draft->in_joint : draft->coordinate.name;
         if (strcmp(names[i], name) == 0) {
             return j->first + i;
         }
