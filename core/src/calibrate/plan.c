@@ -141,7 +141,13 @@ static mhe_status read_entries(mhi_run *run, const mhi_node *list, mhi_plan *pla
 static mhe_status read_recordings(mhi_run *run, mhi_registry *registry, const mhi_node *list,
                                   mhi_plan *plan, mhe_error *err) {
     const mhi_data_section *data = &run->data;
-    const int32_t own = data->markers != NULL || data->emg != NULL || data->angles != NULL;
+    const int32_t own = data->markers != NULL || data->angles != NULL;
+    if (data->emg != NULL && !own) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree,
+                           mhi_node_find(mhi_tree_root(run->tree), "data"),
+                           "data: emg without 'markers' or 'angles': there is no motion to learn "
+                           "from");
+    }
     if (list != NULL && list->kind != MHI_SEQUENCE) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, list,
                            "calibrate.recordings: must be a list: [{markers: FILE, emg: FILE}, "
@@ -169,23 +175,19 @@ static mhe_status read_recordings(mhi_run *run, mhi_registry *registry, const mh
         status = mhi_options_fill(recording_options, N(recording_options), run->tree, node, NULL, 0,
                                   "calibrate.recordings", run->dir, &run->arena, r, err);
         r->node = node;
+        if (status == MHE_OK && r->markers == NULL && r->angles == NULL) {
+            status = mhi_fail_at(err, MHE_E_CONFIG, run->tree, node,
+                                 "calibrate.recordings: neither 'markers' nor 'angles' is given: "
+                                 "there is no motion to learn from");
+        }
         if (status == MHE_OK && r->external_loads != NULL) {
             status = mhi_run_read_loads(run, registry, r->external_loads,
                                         mhi_node_find(node, "external_loads"), &r->loads, err);
         }
     }
     int32_t n = 0;
-    for (int32_t i = 0; i < plan->n_recordings && status == MHE_OK; i++) {
-        const mhi_plan_recording *r = &plan->recordings[i];
-        n += !r->hold_out;
-        if (r->markers == NULL && r->angles == NULL) {
-            status = mhi_fail_at(err, MHE_E_CONFIG, run->tree,
-                                 r->node != NULL ? r->node
-                                                 : mhi_node_find(mhi_tree_root(run->tree), "data"),
-                                 "calibrate: recording %d has neither markers nor angles: its "
-                                 "motion is not known",
-                                 (int)i + 1);
-        }
+    for (int32_t i = 0; i < plan->n_recordings; i++) {
+        n += !plan->recordings[i].hold_out;
     }
     return status == MHE_OK && n == 0
                ? mhi_fail_at(err, MHE_E_CONFIG, run->tree, list,
