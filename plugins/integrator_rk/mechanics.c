@@ -36,7 +36,6 @@
 /* Below this a step has not moved: its derivatives are off by as much. */
 #define RK_UNMOVED 1e-9
 
-/* Stage position and velocity from the stage accelerations. */
 void rk_stage(struct rk_context *c, double h, int32_t j) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q, s = t->stages;
@@ -115,8 +114,6 @@ static mhe_status rk_evaluate_all(struct rk_context *c, const double *r, double 
     return status;
 }
 
-/* LU of I - h^2 (A A) f_q - h A f_v; `only` is the stage whose derivatives serve all, -1: each its
- * own. */
 mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q;
@@ -140,8 +137,6 @@ mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *er
                : mhe_fail(err, MHE_RETRY, "a stage system over %g s has no solution", h);
 }
 
-/* Adds the solution of J x = residual to K (and moves Z, behind rk_states_before). Returns its size
- * as a velocity, in units of 1 + |v|; NaN where it has none. */
 double rk_correct(struct rk_context *c, double h) {
     int32_t n_q = c->rk->system->n_q, n = c->rk->mechanics.stages * n_q;
     int32_t n_z = c->rk->system->n_z;

@@ -6,8 +6,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Stage accelerations of the system linearised at the start of the step, from one evaluation there;
- * leaves its Jacobian factored. */
 mhe_status rk_predict(struct rk_context *c, const double *r, double h, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
     const mhe_system *system = c->rk->system;
@@ -47,7 +45,6 @@ mhe_status rk_predict(struct rk_context *c, const double *r, double h, mhe_error
     return MHE_OK;
 }
 
-/* With states z: the acceleration at the start for all stages, and z itself. */
 mhe_status rk_predict_states(struct rk_context *c, const double *r, mhe_error *err) {
     int32_t n_q = c->rk->system->n_q, n_z = c->rk->system->n_z;
     const mhe_acceleration out = {.size = sizeof out, .vdot = c->f, .zdot = c->H};
@@ -59,8 +56,6 @@ mhe_status rk_predict_states(struct rk_context *c, const double *r, mhe_error *e
     return status;
 }
 
-/* Stage accelerations from those of the last step of this length that was linearised here: to first
- * order in what its data have changed by. Returns the size of the move, NaN: nothing is known. */
 double rk_recall(struct rk_context *c, const double *r, double h) {
     const struct rk_tableau *t = &c->rk->mechanics;
     const mhe_system *system = c->rk->system;
@@ -95,7 +90,6 @@ double rk_recall(struct rk_context *c, const double *r, double h) {
     return rk_correct(c, h);
 }
 
-/* Keeps the step just linearised. */
 void rk_keep(const struct rk_context *c, const double *r, double h) {
     const mhe_system *system = c->rk->system;
     const struct rk_slot *at = &c->kept;
