@@ -143,6 +143,27 @@ static const char *file_of(const mhi_plan *plan, int32_t i) {
     return path == NULL ? "" : behind(path, same > 1 ? 2 : 1);
 }
 
+/* What is known of a recording: without EMG, or without a reference, nothing is to be compared. */
+static void tell_recording(const report_recording *r) {
+    const struct {
+        const char *what, *unit;
+        double before, after, scale;
+    } parts[] = {{"markers", " mm", r->before.marker, r->after.marker, 1e3},
+                 {"EMG", "", r->before.emg, r->after.emg, 1},
+                 {"forces", " N", r->before.force, r->after.force, 1}};
+    const char *between = ":";
+    (void)fprintf(stderr, "%s%s", r->name, r->held_out ? " (held out)" : "");
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        if (!isnan(parts[i].before) || !isnan(parts[i].after)) {
+            (void)fprintf(stderr, "%s %s %.3g -> %.3g%s", between, parts[i].what,
+                          parts[i].scale * parts[i].before, parts[i].scale * parts[i].after,
+                          parts[i].unit);
+            between = ",";
+        }
+    }
+    (void)fputc('\n', stderr);
+}
+
 /* Each recording with the config as it was and with that of the person. */
 static mhe_status compare(const arguments *a, const mhi_calibration *c, const char *person,
                           report_recording *list, mhe_error *err) {
@@ -157,11 +178,7 @@ static mhe_status compare(const arguments *a, const mhi_calibration *c, const ch
             status = held_out_measure(person, NULL, 0, r, c->host, &one->after, err);
         }
         if (status == MHE_OK && !a->quiet) {
-            (void)fprintf(
-                stderr, "%s%s: markers %.3g -> %.3g mm, EMG %.3g -> %.3g, forces %.3g -> %.3g N\n",
-                one->name, r->hold_out ? " (held out)" : "", 1e3 * one->before.marker,
-                1e3 * one->after.marker, one->before.emg, one->after.emg, one->before.force,
-                one->after.force);
+            tell_recording(one);
         }
     }
     return status;
