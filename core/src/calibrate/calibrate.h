@@ -38,6 +38,7 @@ typedef struct mhi_motion {
 
 typedef struct mhi_calibration {
     const mhi_run *run, *start;
+    const mhi_use *persons_solver; /* for the config that is left behind; NULL: the run's. Lent */
     mhi_plan plan;
     const mhe_host *host;
     mhe_description *model; /* as it is in the file */

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "calibrate/calibrate.h"
 #include "estimator/create.h"
+#include "estimator/tasks.h"
 #include "io/model_file.h"
 #include "model/anatomy.h"
 #include "model/bounds.h"
@@ -145,6 +146,11 @@ static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
                             m->run.data.markers, m->recording->rate, r->rate);
         }
     }
+    const mhi_tasks *tasks = NULL;
+    const mhe_status status = mhi_tasks_read(run, c->model, NULL, &c->arena, &tasks, err);
+    if (status != MHE_OK) {
+        return status;
+    }
     c->setup.emg_before = emg_before;
     c->setup.emg = c;
     const mhi_ocp_setup setup = {.host = c->host,
@@ -153,6 +159,7 @@ static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
                                  .integrator_config = run->integrator.config,
                                  .terms = terms,
                                  .n_terms = run->n_costs,
+                                 .tasks = tasks,
                                  .n_intervals = c->n_intervals,
                                  .interval = interval,
                                  .n_workers = run->realtime.threads,
@@ -334,6 +341,19 @@ static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
     return status;
 }
 
+/* Where the config names what refuses: the loads of a recording, or what every run has. */
+static mhe_status locate(const mhi_calibration *c, mhe_status status, mhe_error *err) {
+    const int32_t of_force = err->part == MHE_PART_FORCE && err->entry >= c->run->forces.n;
+    for (int32_t i = 0; i < c->plan.n_recordings && of_force; i++) {
+        const mhi_use *loads = &c->plan.recordings[i].loads;
+        if (c->motions[i].force == err->entry && loads->node != NULL) {
+            const mhe_error why = *err;
+            return mhi_fail_at(err, status, c->run->tree, loads->node, "%s", why.text);
+        }
+    }
+    return of_force ? status : mhi_estimator_locate(c->run, status, err);
+}
+
 mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     problem p = {.solver = c->run->solver.plugin->ops};
     mhe_status status = open_system(c, &p, err);
@@ -343,6 +363,7 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     if (status == MHE_OK) {
         status = open_ocp(c, &p, err);
     }
+    status = status == MHE_OK ? MHE_OK : locate(c, status, err);
     if (status == MHE_OK) {
         status = start_problem(c, &p, err);
     }

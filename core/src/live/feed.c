@@ -189,10 +189,10 @@ static void obey(mhi_feed *f, const mhe_grant *grant) {
     }
 }
 
-static void tell_granted(mhi_feed *f, double time) {
+static void tell_granted(mhi_feed *f, double time, mhe_status status) {
     mhe_grant grant;
     mhi_estimator_granted(f->estimator, &grant);
-    grant.prepared = f->prepared;
+    grant.prepared = status == MHE_E_INTERRUPTED ? MHE_GRANT_STOPPED : f->prepared;
     f->prepared = 0;
     if (f->pusher != NULL) {
         f->pusher(f->data, &grant, f->start + time);
@@ -235,7 +235,7 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_
     f->n_frames++;
     obey(f, grant);
     const mhe_status status = mhe_estimator_push(f->estimator, &frame, &estimate, &ready, &why);
-    tell_granted(f, time);
+    tell_granted(f, time, status);
     if (status == MHE_E_ARGUMENT) { /* its time does not follow */
         f->n_out_of_order++;
         return MHE_OK;
@@ -360,10 +360,13 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
     int64_t before = f->n_frames;
     int32_t next = 0; /* grant */
     for (int32_t k = 0; k < p->n && status == MHE_OK; k++) {
+        const mhe_grant *grant = next < p->n_grants ? &p->grants[next] : NULL;
         const double time =
             p->stamp == NULL ? p->received - (p->n - 1 - k) * period : p->stamp[k] + offset;
-        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels,
-                             next < p->n_grants ? &p->grants[next] : NULL, err);
+        if (grant != NULL && grant->prepared == MHE_GRANT_STOPPED) {
+            break; /* nothing came of it and of those after it */
+        }
+        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, grant, err);
         next += f->n_frames > before;
         before = f->n_frames;
     }
