@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """mhe-calibrate: a person whose muscles are not the model's, found again from a recording; and what is wrong input.
 
-    calibrate.py PATH/mhe-calibrate PATH/mhe-sim SOURCE_DIR
+    calibrate.py PATH/mhe-calibrate PATH/mhe-sim SOURCE_DIR search|data|told
 
 The truth is arm19, whose motions mhe-sim makes; the model that is calibrated has other strengths and fibre lengths, its EMG
 other gains. What counts are the forces of a motion that was not learned from.
@@ -535,6 +535,11 @@ def test_wrong_input():
     expect("absent", CONFIG.replace("A_emg.sto", "A_gme.sto"), "A_gme.sto")
 
 
+PARTS = {"search": [test_finds, test_where_and_when, test_delay, test_scales_first, test_solvers_agree],
+         "data": [test_loaded, test_walks, test_curves_of_2021, test_marker_weights],
+         "told": [test_told, test_channels, test_another_person, test_wrong_input]}
+
+
 def main():
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -542,19 +547,8 @@ def main():
         make_motion("B", 2, 0.15)
         make_motion("C", 3, 0.08)
         make_person("ABC")
-        test_finds()
-        test_where_and_when()
-        test_delay()
-        test_loaded()
-        test_walks()
-        test_scales_first()
-        test_solvers_agree()
-        test_told()
-        test_channels()
-        test_curves_of_2021()
-        test_marker_weights()
-        test_another_person()
-        test_wrong_input()
+        for test in PARTS[sys.argv[4]]:
+            test()
 
 
 main()
