@@ -82,7 +82,7 @@ function showElectrodes(s) {
     $("mvc-bar").max = Math.max(before, mvc.max, 1e-9); $("mvc-bar").value = mvc.max;
     $("mvc-state").textContent = `Now ${mvc.name}: ${(+mvc.max).toPrecision(3)} after ${(+mvc.seconds).toFixed(1)} s`;
   } else if (s.mvc_file) {
-    $("mvc-state").textContent = "Stored in " + s.mvc_file;
+    $("mvc-state").textContent = "The EMG is relative to the maxima found; stored in " + s.mvc_file;
   } else if (!electrodes.length) {
     $("mvc-state").textContent = "There are no raw electrodes (emg.channels): the EMG comes as it is used.";
   }

@@ -68,6 +68,11 @@ static mhe_status estimate_all(mhe_estimator *e, const mhi_recording *r, means *
     return status;
 }
 
+/* What a recording gives cause to say was said when it was read to be learned from. */
+static void say_nothing(const mhe_host *host, int32_t level, const char *text) {
+    (void)host, (void)level, (void)text;
+}
+
 mhe_status held_out_measure(const char *config, const char *const *set, int32_t n_set,
                             const mhi_plan_recording *recording, const mhe_host *host,
                             held_out *out, mhe_error *err) {
@@ -76,21 +81,18 @@ mhe_status held_out_measure(const char *config, const char *const *set, int32_t 
     mhe_estimator *e = NULL;
     const mhe_description *model = NULL;
     means m = {0};
-    mhe_status status = mhe_config_read(config, set, n_set, 0, host, &read, err);
+    mhe_host quiet = *host;
+    quiet.log = say_nothing;
+    mhe_status status = mhe_config_read(config, set, n_set, 0, &quiet, &read, err);
     if (status == MHE_OK) {
-        mhi_data_section *data = &read->run->data;
-        data->markers = recording->markers;
-        data->emg = recording->emg;
-        data->angles = recording->angles;
-        data->reference = recording->reference;
-        data->emg_offset = recording->emg_offset;
+        mhi_plan_take(recording, read->run);
         status = mhi_config_model(read, &model, err);
     }
     if (status == MHE_OK) {
-        status = mhi_recording_read(read->run, model, host, &r, err);
+        status = mhi_recording_read(read->run, model, &quiet, &r, err);
     }
     if (status == MHE_OK) {
-        status = mhi_estimator_create_on(read->run, model, host, &e, err);
+        status = mhi_estimator_create_on(read->run, model, &quiet, &e, err);
     }
     if (status == MHE_OK) {
         status = estimate_all(e, r, &m, err);

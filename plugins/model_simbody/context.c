@@ -71,10 +71,11 @@ static mhe_status list_own(simbody_model *model, mhe_error *err) {
 static void warn_massless(const mhe_host *host, const simbody_model *model) {
     for (int32_t i = 0; i < model->tree->n_q && host != NULL; i++) {
         if (!tree_moves_mass(model->tree, i)) {
-            char text[256];
+            const mhe_description *d = model->description;
+            char text[512];
             (void)snprintf(text, sizeof text,
-                           "coordinate '%s' moves no mass: no force has an acceleration there",
-                           model->description->coordinates[i].name);
+                           "%s: coordinate '%s' moves no mass: no force has an acceleration there",
+                           d->source != NULL ? d->source : "", d->coordinates[i].name);
             host->log(host, MHE_LOG_WARNING, text);
         }
     }

@@ -12,11 +12,12 @@ static void tell_route(const mhe_host *host, const mhe_description *d, const pat
     for (int32_t w = 0; w < route->n_wraps; w++) {
         if (work->state[w] == WRAP_INSIDE) {
             const mhe_path *path = &d->paths[route->path];
-            char text[320];
+            char text[512];
             (void)snprintf(text, sizeof text,
-                           "path '%s' (line %d) has a point inside '%s' at the default position: "
-                           "as in OpenSim it passes straight",
-                           path->name, (int)path->line, d->obstacles[path->wraps[w].obstacle].name);
+                           "%s:%d: path '%s' has a point inside '%s' at the default position: as "
+                           "in OpenSim it passes straight",
+                           d->source != NULL ? d->source : "", (int)path->line, path->name,
+                           d->obstacles[path->wraps[w].obstacle].name);
             host->log(host, MHE_LOG_WARNING, text);
         }
     }

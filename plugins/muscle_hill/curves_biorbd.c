@@ -65,6 +65,7 @@ static void biorbd_prepare(const mhe_muscle *muscle, const struct hill_config *c
     case MHE_MUSCLE_THELEN2003:
         out->curve = biorbd_hill_thelen;
         out->speed = out->inverse / v_max;
+        out->speed_o = -out->speed * out->inverse;
         out->passive_rate = 5 / strain;
         out->passive_scale = 1 / expm1(5);
         break;

@@ -34,6 +34,24 @@ static struct hill_shape paper_passive(const struct hill_muscle *muscle, double 
     return fp;
 }
 
+/* By where it switches on; what jumps there has the slope of either side, 0. */
+static double paper_passive_by(const struct hill_muscle *muscle, double n, double offset) {
+    const double from = muscle->passive_from, ramp = muscle->passive_ramp;
+    if (!(n > from - ramp) || n > from) {
+        return 0;
+    }
+    return -hill_rise((n - from) / ramp + 1).slope / ramp *
+           hill_exponential(n, 10, offset, muscle->passive_scale).value;
+}
+
+static double paper_hill_by(const struct hill_muscle *muscle, double n) {
+    return paper_passive_by(muscle, n, 0);
+}
+
+static double paper_hill_thelen_by(const struct hill_muscle *muscle, double n) {
+    return paper_passive_by(muscle, n, 1);
+}
+
 static void paper_hill(const struct hill_muscle *muscle, double a, double n, double s,
                        struct hill_value *out) {
     double fl_a;
@@ -59,6 +77,8 @@ static void paper_prepare(const mhe_muscle *muscle, const struct hill_config *co
     out->pull = 1;
     out->speed = PAPER_SPEED;
     out->damping = PAPER_DAMPING * out->inverse;
+    out->damping_o = -out->damping * out->inverse;
+    out->passive_by = thelen ? paper_hill_thelen_by : paper_hill_by;
     out->passive_from = out->l_slack * out->inverse;
     out->passive_ramp = config->passive_ramp;
     out->passive_scale = thelen ? 1 / expm1(5) : exp(-5);

@@ -234,7 +234,7 @@ static mhe_status hill_layout(const void *self, mhe_muscle_layout *out, mhe_erro
     out->lower = hill->lower;
     out->upper = hill->upper;
     out->present = hill->present;
-    out->n_parameters = hill_parameters(hill, &out->parameter_names);
+    out->n_parameters = hill_parameters(&out->parameter_names);
     return MHE_OK;
 }
 

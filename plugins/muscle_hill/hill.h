@@ -67,6 +67,10 @@ struct hill_muscle {
     double inverse; /* n per metre of fibre: 1 / l_opt */
     double speed;   /* s per m/s of fibre velocity */
     double damping; /* f_max per unit of s */
+    double speed_o; /* by l_opt: of `speed`, of `damping` */
+    double damping_o;
+    double (*passive_by)(const struct hill_muscle *, double n); /* fp by passive_from, which is
+                                                                 * l_slack / l_opt; NULL: 0 */
     double pull;    /* constant angle: share of the fibre force along the tendon */
     double inv_cos; /* constant angle: 1 / cos(pennation) */
     double height;  /* constant thickness: l_opt sin(pennation), m; 0: constant angle */
@@ -127,7 +131,6 @@ extern const struct hill_curve_set *const hill_curve_sets[];
 /* An instance: the muscles in the order of the model. */
 struct hill {
     int32_t n, n_states;          /* 2 where a tendon is elastic */
-    int32_t unpublished;          /* muscles on sets whose curves hold lengths of their own */
     double smoothing;             /* b of the activation dynamics */
     double *rate_act;             /* 1 / tau_act, 1/s [n] */
     double *rate_deact;           /* 1 / tau_deact, 1/s [n] */
@@ -139,9 +142,9 @@ struct hill {
     uint8_t *present;             /* [n_states x n] */
 };
 
-/* parameters.c: derivatives by max_isometric_force, and where all muscles are on published sets by
- * optimal_fiber_length and tendon_slack_length: n of them. Fills out->force_p and out->rate_p. */
-int32_t hill_parameters(const struct hill *hill, const char *const **names);
+/* parameters.c: derivatives by max_isometric_force, optimal_fiber_length, tendon_slack_length: how
+ * many. Fills out->force_p and out->rate_p. */
+int32_t hill_parameters(const char *const **names);
 void hill_by_parameters(const struct hill *hill, const mhe_muscle_point *at,
                         const mhe_muscle_values *out);
 

@@ -44,6 +44,7 @@ void hill_published_geometry(const mhe_muscle *muscle, const struct hill_config 
                              struct hill_muscle *out) {
     double vmax = config->vmax > 0 ? config->vmax : hill_or(muscle->max_contraction_velocity, 10);
     out->speed = out->inverse / vmax;
+    out->speed_o = -out->speed * out->inverse;
     out->damping = config->damping >= 0 ? config->damping : hill_or(muscle->fiber_damping, 0);
     out->height = muscle->optimal_fiber_length * sin(hill_or(muscle->pennation_angle, 0));
     out->inv_cos = out->pull = 1; /* where the height is 0 */
@@ -57,6 +58,8 @@ struct hill_rule {
 };
 
 static mhe_status hill_check(const mhe_muscle *m, mhe_error *err) {
+    /* infinite: no passive force */
+    const double passive = m->passive_strain == INFINITY ? 1 : m->passive_strain;
     const struct hill_rule rules[] = {
         {"maximal isometric force", m->max_isometric_force, 0, 1, 1},
         {"optimal fibre length", m->optimal_fiber_length, 0, 1, 1},
@@ -66,7 +69,7 @@ static mhe_status hill_check(const mhe_muscle *m, mhe_error *err) {
         {"activation time constant", m->activation_time, 0, 0, 1},
         {"deactivation time constant", m->deactivation_time, 0, 0, 1},
         {"fibre damping", m->fiber_damping, 0, 0, 0},
-        {"passive strain", m->passive_strain, 0, 0, 1},
+        {"passive strain", passive, 0, 0, 1},
         {"passive shape", m->passive_shape, 0, 0, 1},
         {"active shape", m->active_shape, 0, 0, 1},
         {"force-velocity shape", m->velocity_shape, 0, 0, 1},
@@ -129,8 +132,8 @@ static void hill_tell_sets(const mhe_host *host, const mhe_muscle *muscles, int3
         }
         size_t used = strlen(line);
         if (count > 0) {
-            (void)snprintf(line + used, sizeof line - used, " %s for %d", hill_curve_sets[k]->name,
-                           count);
+            (void)snprintf(line + used, sizeof line - used, "%s %s for %d",
+                           line[used - 1] == ':' ? "" : ",", hill_curve_sets[k]->name, count);
         }
     }
     host->log(host, MHE_LOG_INFO, line);
@@ -209,7 +212,6 @@ static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *from
                                from->tendon_force_length, from->force_velocity};
         m->file = &hill->file[i];
     }
-    hill->unpublished += !set->published;
     set->prepare(from, config, m);
     m->passive_scale *= config->passive;
     hill->rate_act[i] =

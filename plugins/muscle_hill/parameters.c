@@ -4,7 +4,8 @@
  * A force is F_max times a function of normalised lengths. On a rigid tendon the fibre lies along
  * L - l_slack, so that dF/dl_slack = -dF/dL; with h = l_opt sin(pennation) the thickness and m =
  * hypot(L - l_slack, h) the fibre, l_opt acts on n = m / l_opt, on the velocity and on the
- * pennation. With an elastic tendon both act on its stretch x = (L - z l_opt) / l_slack alone. */
+ * pennation; where curves switch at the slack length, both act there too. With an elastic tendon
+ * both act on its stretch x = (L - z l_opt) / l_slack alone. */
 #include "elastic.h"
 #include "hill.h"
 
@@ -12,11 +13,11 @@
 
 enum { STRENGTH, FIBER, SLACK, N_PARAMETERS };
 
-int32_t hill_parameters(const struct hill *hill, const char *const **names) {
+int32_t hill_parameters(const char *const **names) {
     static const char *const all[] = {"max_isometric_force", "optimal_fiber_length",
                                       "tendon_slack_length"};
     *names = all;
-    return hill->unpublished > 0 ? 1 : N_PARAMETERS;
+    return N_PARAMETERS;
 }
 
 static void hill_rigid_by(const struct hill_muscle *m, double a, double l, double w,
@@ -27,8 +28,10 @@ static void hill_rigid_by(const struct hill_muscle *m, double a, double l, doubl
     m->curve(m, a, fibre.n, fibre.s, &value);
     const double along = value.f + m->damping * fibre.s, along_s = value.f_s + m->damping;
     by[STRENGTH] = along * fibre.pull;
+    const double by_from = m->passive_by == NULL ? 0 : m->passive_by(m, fibre.n);
     by[SLACK] = -m->f_max *
-                ((value.f_n * fibre.n_l + along_s * fibre.s_l) * fibre.pull + along * fibre.pull_l);
+                ((value.f_n * fibre.n_l + along_s * fibre.s_l - by_from * m->inverse) * fibre.pull +
+                 along * fibre.pull_l);
     double length_o = 0, cosine_o = 0; /* of the fibre and of cos(pennation), by l_opt */
     const double x = l - m->l_slack;
     if (m->height != 0) {
@@ -37,15 +40,17 @@ static void hill_rigid_by(const struct hill_muscle *m, double a, double l, doubl
         cosine_o = -x * length_o / (length * length);
     }
     const double n_o = (length_o - fibre.n) * m->inverse;
-    const double s_o = w * m->speed * cosine_o - fibre.s * m->inverse;
+    const double s_o = w * m->speed * cosine_o + fibre.s * m->speed_o / m->speed;
+    const double along_o = m->damping_o * fibre.s - by_from * m->passive_from * m->inverse;
     const double pull_o = fibre.pull == 0 ? 0 : cosine_o;
-    by[FIBER] = m->f_max * ((value.f_n * n_o + along_s * s_o) * fibre.pull + along * pull_o);
+    by[FIBER] =
+        m->f_max * ((value.f_n * n_o + along_s * s_o + along_o) * fibre.pull + along * pull_o);
 }
 
 void hill_by_parameters(const struct hill *hill, const mhe_muscle_point *at,
                         const mhe_muscle_values *out) {
     const char *const *names = NULL;
-    const int32_t n = hill->n, n_p = hill_parameters(hill, &names), all = n_p * hill->n_states * n;
+    const int32_t n = hill->n, n_p = hill_parameters(&names), all = n_p * hill->n_states * n;
     for (int32_t i = 0; i < all && out->rate_p != NULL; i++) {
         out->rate_p[i] = 0; /* activations see none of them */
     }

@@ -272,8 +272,11 @@ static mhe_status listen_on(web *w, mhe_error *err) {
     info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
     w->context = lws_create_context(&info);
     if (w->context == NULL) {
-        return mhe_fail(err, MHE_E_IO, "%s, port %d: cannot be listened on; is it in use?",
-                        w->config.address, (int)w->config.port);
+        return mhe_fail(
+            err, MHE_E_IO,
+            "%s, port %d: cannot be listened on; is it in use? Is the address one of this "
+            "machine?",
+            w->config.address, (int)w->config.port);
     }
     char line[256];
     const int port = lws_get_vhost_listen_port(lws_get_vhost_by_name(w->context, "default"));

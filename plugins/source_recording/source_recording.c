@@ -36,7 +36,7 @@ typedef struct recording {
     int32_t
         *of_slot; /* [n_slots] track that a stream is now: one that is described again is another */
     const mhe_recorded *arrivals; /* file whose packets are repeated; NULL: none */
-    int64_t next_arrival, next_grant;
+    int64_t next_arrival, next_grant, next_maximum;
     double offset; /* of the packet in work: stamps + offset is CLOCK_MONOTONIC; NaN: not known */
     double first;  /* s, earliest stamp */
     double begun;  /* s of CLOCK_MONOTONIC at which `first` is due */
@@ -208,6 +208,23 @@ static void add_grants(recording *s, mhe_chunk *chunk) {
     }
 }
 
+/* Maxima that were found before this packet. */
+static void add_maxima(recording *s, mhe_chunk *chunk) {
+    const mhe_recorded *r = s->arrivals;
+    if (r->size < sizeof *r || r->maxima == NULL) {
+        return;
+    }
+    chunk->maxima = (const mhe_maximum *)(const void *)((const char *)r->maxima +
+                                                        (size_t)s->next_maximum * r->maximum_size);
+    chunk->maximum_size = r->maximum_size;
+    const mhe_maximum *next = chunk->maxima;
+    while (s->next_maximum < r->n_maxima && next->arrival <= s->next_arrival) {
+        s->next_maximum++;
+        chunk->n_maxima++;
+        next = (const mhe_maximum *)(const void *)((const char *)next + r->maximum_size);
+    }
+}
+
 static void repeat(recording *s, double deadline, const mhe_source_taker *taker) {
     while (!s->ended && (s->config.speed == 0 || now() < deadline)) {
         if (s->next_arrival == s->arrivals->n_arrivals) {
@@ -243,6 +260,7 @@ static void repeat(recording *s, double deadline, const mhe_source_taker *taker)
                            .values = t->stream->values + t->next * t->stream->about.n_channels};
         s->offset = a->offset;
         add_grants(s, &chunk);
+        add_maxima(s, &chunk);
         t->next += a->n;
         s->next_arrival++;
         taker->chunk(taker->data, &chunk);

@@ -31,7 +31,7 @@ def write(name, text):
         file.write(text)
 
 
-def make_motion(name, seed, least):
+def make_motion(name, seed, least, more=""):
     """Postures at random, followed with the least excitation above `least`."""
     r = random.Random(seed)
     low, high = [-0.4, -1.4, -0.6, 0.1], [0.3, -0.2, 0.4, 1.6]
@@ -42,7 +42,7 @@ def make_motion(name, seed, least):
     write(name + "_postures.sto", "postures\nnRows=%d\nnColumns=5\ninDegrees=no\nendheader\ntime\tArm_RotY\tArm_RotX\t"
           "Arm_RotY2\tLowerArm1_RotZ\n%s\n" % (len(rows), "\n".join("\t".join("%.4f" % x for x in [t] + q) for t, q in rows)))
     write(name + ".yaml", "model: {file: %s}\nmuscle: {curves: degroote2016}\nhorizon: {window: 7, ratio: 1}\n"
-          "bounds: {excitation_min: %g}\ncosts: [mhe.cost.min-excitation]\nsolver: mhe.solver.rti\n" % (ARM, least))
+          "bounds: {excitation_min: %g}\ncosts: [mhe.cost.min-excitation]\nsolver: mhe.solver.rti\n%s" % (ARM, least, more))
     done = run(SIM, "follow", name + ".yaml", "--input", name + "_postures.sto", "--out", name)
     assert done.returncode == 0, done.stderr
 
@@ -116,6 +116,8 @@ def test_finds():
     assert abs(written / was / float(rows["max_isometric_force of BRA"]["after"]) - 1) < 1e-5
     page = open("out/report.html").read()
     assert "emg_gain of Deltoid2" in page and "held out" in page
+    with open("out/calibrated.yaml") as file:
+        assert "preset: balanced" in file.read()  # the solver of the config, not what the whole recordings are solved with
     done = run(os.path.join(os.path.dirname(CALIBRATE), "mhe-run"), "--check", "out/calibrated.yaml")
     assert done.returncode == 0, done.stderr
 
@@ -178,6 +180,26 @@ def test_where_and_when():
     assert any(abs(delay - early) < 0.004 for delay in delays), delays
 
 
+def test_delay():
+    """Motions of 2 s without noise: a delay is off by less than half its standard deviation, whatever it is."""
+    config = re.sub("([ABC])_emg", r"\1_late", CONFIG).replace("model.osim", ARM)
+    for early in (0, 0.01):
+        for motion in "ABC":
+            with open(motion + "/emg.sto") as file:
+                lines = file.read().split("\n")
+            head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+            rows = [line.split("\t", 1) for line in lines[head + 1:] if line]
+            write(motion + "_late.sto", "\n".join(lines[:head + 1] + ["%.4f\t%s" % (float(row[0]) - early, row[1])
+                                                                     for row in rows]) + "\n")
+        write("delay.yaml", config[:config.index("  parameters:")] +
+              "  parameters:\n    - {name: emg_delay, together: true, lower: -0.1, mean: 0, sd: 0.1}\n")
+        done = run(CALIBRATE, "delay.yaml", "--out", "delay", "--quiet")
+        assert done.returncode == 0, done.stderr
+        with open("delay/parameters.csv") as file:
+            row = next(csv.DictReader(file))
+        assert abs(float(row["after"]) - early) < 0.5 * float(row["sd"]) < 0.0025, (early, row)
+
+
 def expect(what, config, *words):
     write("bad.yaml", config)
     done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
@@ -222,6 +244,104 @@ def test_scales_first():
         found, right = point_of(one.read(), "SupraSpin")[0], point_of(other.read(), "SupraSpin")[0]
     assert max(abs(a - b) for a, b in zip(found, right)) < 1e-5, (found, right)
     expect("no setup", CONFIG.replace("calibrate:", "calibrate:\n  scale: absent.xml"), "absent.xml")
+
+
+WEIGHT = """<OpenSimDocument Version="40000"><ExternalLoads name="hand"><objects><ExternalForce name="weight">
+<applied_to_body>%s</applied_to_body><force_expressed_in_body>ground</force_expressed_in_body>
+<point_expressed_in_body>hand</point_expressed_in_body><force_identifier>f</force_identifier><point_identifier>p</point_identifier>
+</ExternalForce></objects><datafile>weight.sto</datafile></ExternalLoads></OpenSimDocument>
+"""
+
+
+def write_weight(newtons, seconds):
+    """A weight in the hand, down along the ground's z."""
+    row = "\t0\t0\t%g\t0\t-0.05\t0\n" % -newtons
+    write("weight.sto", "weight\nversion=1\nnRows=2\nnColumns=7\ninDegrees=no\nendheader\ntime\tfx\tfy\tfz\tpx\tpy\tpz\n0%s%g%s" %
+          (row, seconds, row))
+    write("weight.xml", WEIGHT % "hand")
+
+
+def test_loaded():
+    """A recording with a known weight in the hand, beside one without: the weight acts in its own recording alone."""
+    write_weight(20, 3)
+    make_motion("L", 2, 0.15, "data: {external_loads: weight.xml}\n")
+    make_person("L")
+    loaded = CONFIG.replace("markers: B/", "markers: L/").replace("emg: B_", "emg: L_").replace(
+        "B/reference.sto", "L/reference.sto, external_loads: weight.xml")
+    forces = {}
+    for name, config in (("loaded", loaded), ("weightless", loaded.replace(", external_loads: weight.xml", ""))):
+        write("loaded.yaml", config)
+        done = run(CALIBRATE, "loaded.yaml", "--out", name, "--quiet")
+        assert done.returncode == 0, done.stderr
+        with open(name + "/calibration.json") as file:
+            told = json.load(file)
+        assert told["outcome"] == "converged", (name, told["outcome"])
+        forces[name] = [(r["before"]["force_n"], r["after"]["force_n"]) for r in told["recordings"]]
+        with open(name + "/parameters.csv") as file:
+            rows = {row["parameter"]: row for row in csv.DictReader(file)}
+        for muscle, factor in STRONGER.items():
+            row = rows["max_isometric_force of " + muscle]
+            off = abs(float(row["after"]) - factor) / float(row["sd"])
+            assert muscle != "BRA" or (off < 2 if name == "loaded" else off > 10), (name, off, row)
+            assert name != "loaded" or off < 2, (off, row)
+    assert all(after < 0.1 * before for before, after in forces["loaded"]), forces
+    assert forces["weightless"][1][1] > 5 * forces["loaded"][1][1], forces  # the weight taken for weakness
+    # Before all recordings, alone, and from the data section.
+    alone = re.sub(r"    - \{markers: [AL].*\n", "", loaded).replace(
+        "calibrate:", "data: {markers: L/markers.trc, emg: L_emg.sto, external_loads: weight.xml}\ncalibrate:", 1)
+    write("alone.yaml", alone)
+    done = run(CALIBRATE, "alone.yaml", "--out", "alone", "--quiet", "--set", "calibrate.max_iterations=1")
+    assert done.returncode == 0, done.stderr
+    with open("alone/calibrated.yaml") as file:
+        assert "weight.xml" in file.read()  # and mhe-run estimates with it
+    write_weight(20, 1)  # it ends before the motion does: told before the search, held out or not
+    expect("short loads", loaded, "weight.xml", "0 to 1 s", "L/markers.trc", "0 to 2 s")
+    expect("short held-out loads", loaded.replace("hold_out: true", "hold_out: true, external_loads: weight.xml").replace(
+        "L/reference.sto, external_loads: weight.xml", "L/reference.sto"), "weight.xml", "0 to 1 s", "C/markers.trc")
+    write("weight.xml", WEIGHT % "hnad")
+    expect("a load on no body", loaded, "weight.xml", "hnad")
+    expect("no loads", loaded.replace("weight.xml", "wieght.xml"), "wieght.xml")
+
+
+WALK = """model: {file: weaker.osim, unsupported: warn, paths: fitted, locked_at: {lumbar_extension: -0.4}}
+formulation: activation
+data:
+  markers: %(walk)s_markers.trc
+  emg: %(walk)s_emg.sto
+  emg_delay: 0
+  external_loads: %(walk)s_loads.xml
+  reference: %(walk)s_reference.sto
+horizon: {window: 7, ratio: 1}
+bounds: {residual_torques: true, residual_torque_max: 1000}
+integrator: {plugin: mhe.integrator.rk, scheme: gauss, stages: 1, max_step: 0.02, tolerance: 0}
+costs: [{plugin: mhe.cost.emg-markers, emg_spread: 0.1, residual_torque: 3}]
+calibrate: {noise_time: 0.05, parameters: [{name: max_isometric_force, muscles: [%(muscles)s]}]}
+"""
+
+
+def test_walks():
+    """Strengths of legs from a walk under the ground's reaction; the known motion has residual forces of 3 N."""
+    weaker = {"soleus_r": 1.3, "gastroc_r": 0.75, "vasti_r": 1.25, "glut_max_r": 0.8}
+    folder = os.path.join(SOURCE, "models", "gait10dof")
+    with open(os.path.join(folder, "subject01.osim")) as file:
+        text = file.read()
+    for name, factor in weaker.items():
+        text = re.sub(r'(Muscle name="%s">.*?<max_isometric_force>)([^<]+)' % name,
+                      lambda m: m.group(1) + "%.10g" % (float(m.group(2)) / factor), text, count=1, flags=re.S)
+    write("weaker.osim", text)
+    write("walk.yaml", WALK % {"walk": os.path.join(folder, "demo_walk"), "muscles": ", ".join(weaker)})
+    done = run(CALIBRATE, "walk.yaml", "--out", "walk", "--quiet")
+    assert done.returncode == 0, done.stderr
+    with open("walk/calibration.json") as file:
+        told = json.load(file)
+    assert told["outcome"] == "converged", told["outcome"]
+    forces = told["recordings"][0]
+    assert forces["after"]["force_n"] < 0.6 * forces["before"]["force_n"], forces  # with the true strengths: the same
+    with open("walk/parameters.csv") as file:
+        rows = {row["parameter"]: row for row in csv.DictReader(file)}
+    for name, factor in weaker.items():
+        row = rows["max_isometric_force of " + name]
+        assert abs(float(row["after"]) - factor) < 2 * float(row["sd"]) < 0.45, (name, row)
 
 
 def test_solvers_agree():
@@ -270,6 +390,7 @@ def test_told():
     lines = [line for line in done.stderr.split("\n") if " of " in line and "warning" not in line]
     assert any(line.startswith("emg_gain of Latissimus1: not informed") for line in lines), lines
     assert any("max_isometric_force of TricepsLong: the data contradict" in line for line in lines), lines
+    assert not any("TricepsLong: not informed" in line for line in lines), lines
     assert any("max_isometric_force of BRA stands at its bound, 1.01" in line for line in lines), lines
     with open("told/parameters.csv") as file:
         rows = {row["parameter"]: row for row in csv.DictReader(file)}
@@ -299,6 +420,52 @@ def test_channels():
     assert any("B_odd.sto: the same value" in line and "SubScap" in line for line in lines), lines
     told = [line for line in lines if "times its MVC" in line]
     assert len(told) == 1 and told[0].startswith("EMG of BRD reaches 1.20 times its MVC"), told
+    assert "emg_gain for it" in told[0], told
+    done = run(CALIBRATE, "odd.yaml", "--out", "odd", "--set", "calibrate.max_iterations=1", "--set", "calibrate.recordings=["
+               "{markers: B/markers.trc, emg: B_odd.sto}]", "--set", "calibrate.parameters=[{name: emg_gain, muscles: [BRD]}]")
+    assert done.returncode == 0, done.stderr
+    assert "EMG of SubScap is 0.2 in every sample" in done.stderr, done.stderr
+    assert re.search(r"EMG of BRD reaches 1.20 times its MVC.*its emg_gain became", done.stderr), done.stderr
+
+
+def test_marker_weights():
+    """A marker of weight 0 is as good as one that was never seen."""
+    for kind in ("off", "gone"):
+        for motion in "ABC":
+            with open(motion + "/markers.trc") as file:
+                lines = file.read().split("\n")
+            head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+            for i in range(head, len(lines)):
+                cells = lines[i].split("\t")
+                for j in range(3 * 7 + 2, min(3 * 8 + 2, len(cells))):  # STYLu
+                    cells[j] = "%.6f" % (float(cells[j]) + 15) if kind == "off" else ""
+                lines[i] = "\t".join(cells)
+            write("%s_%s.trc" % (motion, kind), "\n".join(lines))
+    found = []
+    for kind, weights in (("off", "marker_weights: {STYLu: 0}"), ("gone", "marker_weights: {}"), ("off", "marker_weights: {}")):
+        write("weights.yaml", re.sub("([ABC])/markers", r"\1_" + kind, CONFIG).replace("calibrate:", "data: {%s}\ncalibrate:" % weights))
+        done = run(CALIBRATE, "weights.yaml", "--out", "weights", "--quiet", "--set", "calibrate.tolerance=1e-12")
+        assert done.returncode == 0, done.stderr
+        with open("weights/calibration.json") as file:
+            found.append([one["after"] for one in json.load(file)["parameters"]])
+    off = [max(abs(a - b) for a, b in zip(found[0], other)) for other in found[1:]]
+    assert off[0] < 1e-4 and off[1] > 1e-2, off
+
+
+def test_another_person():
+    """5 % larger all over: too little to be refused by the markers' distances, but no model fits both."""
+    with open("B/markers.trc") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+    for i in range(head, len(lines)):
+        cells = lines[i].split("\t")
+        lines[i] = "\t".join(cells[:2] + ["%.6f" % (1.05 * float(cell)) if cell else "" for cell in cells[2:]])
+    write("larger.trc", "\n".join(lines))
+    write("larger.yaml", CONFIG.replace("B/markers.trc", "larger.trc"))
+    done = run(CALIBRATE, "larger.yaml", "--out", "larger", "--set", "calibrate.max_iterations=2")
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.split("\n") if "another person" in line]
+    assert len(told) == 1 and told[0].startswith("larger.trc: markers stay 2"), done.stderr
 
 
 def test_wrong_input():
@@ -316,6 +483,8 @@ def test_wrong_input():
            "exact")
     expect("twice", CONFIG.replace("[BRA, Deltoid2]", "[BRA, BRA]"), "bad.yaml:14", "BRA", "twice")
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
+    expect("no motion", CONFIG.replace("markers: B/markers.trc, ", ""), "bad.yaml:10", "markers", "angles")
+    expect("no EMG", re.sub(", emg: ._emg.sto", "", CONFIG), "bad.yaml:14", "emg_gain", "no recording")
     expect("nothing to learn from", CONFIG.replace("reference.sto}", "reference.sto, hold_out: true}"), "bad.yaml", "learn")
     with open("B/markers.trc") as file:  # another person's forearm: the last two markers 20 % farther from the one before
         lines = file.read().split("\n")
@@ -340,10 +509,15 @@ def main():
         make_person("ABC")
         test_finds()
         test_where_and_when()
+        test_delay()
+        test_loaded()
+        test_walks()
         test_scales_first()
         test_solvers_agree()
         test_told()
         test_channels()
+        test_marker_weights()
+        test_another_person()
         test_wrong_input()
 
 

@@ -7,7 +7,9 @@
  * Streams NAME-markers (100 Hz, mm, a sample a frame) and NAME-emg (2000 Hz, thinned to EMG_RATE,
  * in packets of PACKET samples). Each packet of EMG leaves when its last sample is there plus a
  * random delay of up to DELAY seconds; what leaves is in the order of these times whatever the
- * machine does. LABEL: marker that is called OTHER. */
+ * machine does. LABEL: marker that is called OTHER. Where FOLDER has a NAME.pace (lsl_pace.h), it
+ * begins when told to and waits for whoever takes its samples. */
+#include "lsl_pace.h"
 #include "lsl_rig.h"
 
 #include <math.h>
@@ -25,6 +27,7 @@ typedef struct sender {
     int32_t packet, step; /* samples; samples of the recording a sample sent */
     double delay;
     uint64_t seed;
+    lsl_pace *pace; /* NULL: it waits for nobody */
 } sender;
 
 static double random_of(sender *s) {
@@ -67,6 +70,7 @@ static void send_frame(sender *s, int64_t k, double stamp) {
         row[i] = 1000 * from[i];
     }
     (void)s->rig.lsl.push_sample_dtp(s->marker_outlet, row, stamp, 1);
+    lsl_pace_sent(s->pace, LSL_PACE_MARKERS, 1);
 }
 
 static void send_packet(sender *s, int64_t first, double start) {
@@ -78,9 +82,11 @@ static void send_packet(sender *s, int64_t first, double start) {
                                          s->emg.values + to_and_fro(k * s->step, s->emg.n_rows) * n,
                                          stamp, i == s->packet - 1);
     }
+    lsl_pace_sent(s->pace, LSL_PACE_EMG, s->packet);
 }
 
 static void play(sender *s) {
+    lsl_pace_wait(s->pace);
     const double clock = s->rig.lsl.local_clock() - lsl_rig_now();
     const double start = lsl_rig_now(), period = s->step / s->emg.rate;
     int64_t frame = 0, sample = 0;
@@ -91,6 +97,7 @@ static void play(sender *s) {
             lsl_rig_rest(start + at - lsl_rig_now());
         }
         if (next <= due) {
+            lsl_pace_before_frame(s->pace, frame);
             send_frame(s, frame++, start + next + clock);
         } else {
             send_packet(s, sample, start + clock);
@@ -123,6 +130,7 @@ int main(int argc, char **argv) {
     s.delay = atof(argv[4]);
     s.step = (int32_t)(s.emg.rate / atof(argv[5]) + 0.5);
     s.seed = 1;
+    s.pace = lsl_pace_map(argv[1], argv[2], 0);
     if (open_streams(&s, argv[2], argc > 7 ? argv[6] : NULL, argc > 7 ? argv[7] : NULL)) {
         play(&s);
     }

@@ -165,7 +165,7 @@ setTimeout(() => fail("not done in 500 s"), 500000);
   await until("the contraction", () => b.ask("/Now Biceps/.test(document.getElementById('mvc-state').textContent)"));
   await rest(500);
   await b.ask("document.getElementById('mvc').click(); document.getElementById('record').click(); 1");
-  await until("the maximum", () => b.ask("/Stored in/.test(document.getElementById('mvc-state').textContent)"));
+  await until("the maximum", () => b.ask("/stored in/.test(document.getElementById('mvc-state').textContent)"));
   await until("the recording's end", () => b.ask("document.getElementById('record').getAttribute('aria-pressed') === 'false'"));
   must(await b.ask("[...document.querySelectorAll('button,select,input,canvas')].every(e => e.getAttribute('aria-label') || e.textContent.trim() || e.closest('label,[role=img],[aria-hidden=true]'))"), "a control without a name");
   phase("buttons");

@@ -2,8 +2,9 @@
 /* Live runs against liblsl itself: a sender in a process of its own, the run, and a receiver of
  * what sink_lsl sends. EMG at 2000 Hz comes in packets of 27 samples, up to 40 ms late; the sender
  * has a clock 1000 s off; it is killed and comes again, as it was, with another label, at another
- * rate. */
+ * rate. The sender waits for the run (lsl_pace.h), so that nothing here depends on speed. */
 #include "live_rig.h"
+#include "lsl_pace.h"
 #include "lsl_rig.h"
 
 #include <math.h>
@@ -20,6 +21,7 @@
 #define WIDTH 64
 
 static lsl_rig rig;
+static lsl_pacer pacer;
 
 /* ---- the sender ---- */
 
@@ -40,6 +42,14 @@ static void kill_sender(pid_t child) {
     }
 }
 
+/* A sender that waits for the run: its pace is there before it looks for it. */
+static pid_t paced_sender(const char *const *arguments, const char *name) {
+    lsl_pace *pace = lsl_pace_map(live_rig_folder(), name, 1);
+    const pid_t child = pace == NULL ? -1 : start_sender(arguments);
+    lsl_pace_unmap(pace);
+    return child;
+}
+
 static pid_t plain_sender(const char *name, const char *rate, const char *label,
                           const char *other) {
     const char *const arguments[] = {MHE_TEST_BINARY_DIR "/tests/lsl_sender",
@@ -51,7 +61,7 @@ static pid_t plain_sender(const char *name, const char *rate, const char *label,
                                      label,
                                      other,
                                      NULL};
-    return start_sender(arguments);
+    return paced_sender(arguments, name);
 }
 
 /* ---- the receiver: what sink_lsl sends ---- */
@@ -65,7 +75,7 @@ typedef struct receiver {
 } receiver;
 
 static int open_receiver(receiver *r, const char *name) {
-    char predicate[100];
+    char predicate[128];
     lsl_streaminfo info = NULL;
     int32_t code = 0;
     (void)snprintf(predicate, sizeof predicate, "name='%s'", name);
@@ -132,7 +142,7 @@ static void receive(receiver *r, double seconds, int32_t enough) {
     "    - {name: Biceps, muscles: [BicepsLong, BicepsShort], mvc: 0.00129}\n"             \
     "    - {name: Brach, muscles: [BRA], mvc: 0.0006}\n"                                   \
     "    - {name: BrachRad, muscles: [BRD], mvc: 0.0005}\n"                                \
-    "horizon: {window: 7, ratio: 1}\n"                                                     \
+    "horizon: {window: 12, ratio: 1}\n"                                                    \
     "integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03}\n"   \
     "costs:\n"                                                                             \
     "  - plugin: mhe.cost.emg-markers-high\n"                                              \
@@ -155,6 +165,8 @@ static const char *config_of(const char *name) {
     return text;
 }
 
+/* liblsl takes the delay of a clock's measurement to be the same both ways: on a starved machine
+ * the two streams may be tens of milliseconds apart. Hence the window of 12. */
 static void begin_run(const char *name, double seconds, void *(*director)(void *)) {
     memset(&heard, 0, sizeof heard);
     run = (live_rig){.name = name,
@@ -164,22 +176,44 @@ static void begin_run(const char *name, double seconds, void *(*director)(void *
                      .data = (void *)(uintptr_t)name};
 }
 
+/* The receiver is there before the first sample leaves. */
+static int begin_sending(const char *name) {
+    char out[100];
+    (void)snprintf(out, sizeof out, "%s-out", name);
+    const int ready = lsl_pacer_start(&pacer, live_rig_folder(), name, run.live) &&
+                      open_receiver(&heard, out) &&
+                      live_words_wait(&run.words, "frames come from", 1);
+    if (ready) {
+        lsl_pacer_go(&pacer);
+    }
+    return ready;
+}
+
+/* Estimates that were made; the run is over. */
+static int32_t count_estimates(void) {
+    char *json = NULL;
+    const int known = mhe_live_summary(run.live, &json, NULL) == MHE_OK;
+    const int32_t n = known ? (int32_t)live_rig_number(json, "estimates") : 0;
+    mhe_free(json);
+    return n;
+}
+
 static void *only_receive(void *data) {
-    char name[100];
-    (void)snprintf(name, sizeof name, "%s-out", (const char *)data);
-    if (open_receiver(&heard, name)) {
-        while (atomic_load(&heard.n) == 0 && live_words_count(&run.words, "the end") == 0) {
+    if (begin_sending(data)) {
+        while (!atomic_load(&run.over)) {
             receive(&heard, 0.5, MOST);
         }
-        receive(&heard, 2, MOST);
+        receive(&heard, PATIENCE, count_estimates());
+    } else {
+        mhe_live_stop(run.live);
     }
+    lsl_pacer_stop(&pacer);
     return NULL;
 }
 
-/* Every row that was received is a row of the files, bit for bit and in their order; all of them
- * where no sink has lost any. */
+/* The rows that were received are those of the files, bit for bit. */
 static void check_heard(const char *name) {
-    int32_t n_rows, n_q, n_forces, n_emg, at = 0;
+    int32_t n_rows, n_q, n_forces, n_emg;
     double *q = live_rig_table(name, "live_q.sto", &n_rows, &n_q);
     double *force = live_rig_table(name, "live_force.sto", &n_rows, &n_forces);
     double *emg = live_rig_table(name, "live_emg.sto", &n_rows, &n_emg);
@@ -188,21 +222,13 @@ static void check_heard(const char *name) {
     assert_non_null(emg);
     assert_int_equal(heard.n_channels, n_q + n_forces + 3); /* status, latency, lost */
     assert_string_equal(heard.labels[n_q], "force.Pectoral2");
-    const int32_t n = atomic_load(&heard.n);
-    const double *end = heard.values[n > 0 ? n - 1 : 0];
-    assert_true(n > 100);
-    for (int32_t k = 0; k < n; k++) {
-        while (at < n_rows &&
-               (memcmp(heard.values[k], q + at * n_q, sizeof *q * (size_t)n_q) != 0 ||
-                memcmp(heard.values[k] + n_q, force + at * n_forces,
-                       sizeof *q * (size_t)n_forces) != 0)) {
-            at++;
-        }
-        assert_true(at < n_rows);
-        at++;
-    }
-    if (end[heard.n_channels - 1] == 0 && live_rig_number(run.summary, "lost") == 0 && n < MOST) {
-        assert_int_equal(n, n_rows);
+    assert_true(n_rows > 100);
+    assert_int_equal(atomic_load(&heard.n), n_rows);
+    for (int32_t k = 0; k < n_rows; k++) {
+        assert_memory_equal(heard.values[k], q + k * n_q, sizeof *q * (size_t)n_q);
+        assert_memory_equal(heard.values[k] + n_q, force + k * n_forces,
+                            sizeof *q * (size_t)n_forces);
+        assert_true(heard.values[k][heard.n_channels - 1] == 0);
     }
     free(q);
     free(force);
@@ -215,23 +241,21 @@ static void check_run(mhe_status status) {
     }
 }
 
-/* Every node has its EMG on a machine that keeps up; one that stops the sender for longer than the
- * window lasts may take it from some. With late samples dropped it would be most of them. */
+/* Every node has its EMG. With late samples dropped most would have none. */
 static void check_nodes(void) {
-    assert_true(20 * live_rig_number(run.summary, "nodes_without") <=
-                live_rig_number(run.summary, "nodes"));
+    assert_int_equal(live_rig_number(run.summary, "nodes_without"), 0);
+    assert_true(live_rig_number(run.summary, "late_nodes") > 0); /* they do come late */
 }
 
 static void emg_in_late_packets(void **state) {
     (void)state;
     pid_t sender = plain_sender("late", "2000", NULL, NULL);
-    begin_run("late", 4, only_receive);
+    begin_run("late", 2.5, only_receive);
     const mhe_status status = live_rig_run(&run);
     kill_sender(sender);
     check_run(status);
-    assert_true(live_rig_number(run.summary, "frames") >= 390);
-    assert_true(live_rig_number(run.summary, "nodes") >= 390);
-    assert_true(live_rig_number(run.summary, "late_nodes") > 0); /* they do come late */
+    assert_true(live_rig_number(run.summary, "frames") >= 240);
+    assert_true(live_rig_number(run.summary, "nodes") >= 230);
     check_nodes();
     check_heard("late");
     mhe_free(run.summary);
@@ -260,14 +284,14 @@ static void a_clock_far_off(void **state) {
                                      "0.04",
                                      "2000",
                                      NULL};
-    pid_t sender = start_sender(arguments);
-    begin_run("off", 3, only_receive);
+    pid_t sender = paced_sender(arguments, "off");
+    begin_run("off", 1.5, only_receive);
     const double before = lsl_rig_now();
     const mhe_status status = live_rig_run(&run);
     const double after = lsl_rig_now();
     kill_sender(sender);
     check_run(status);
-    assert_true(live_rig_number(run.summary, "frames") >= 290);
+    assert_true(live_rig_number(run.summary, "frames") >= 140);
     check_nodes();
     check_heard("off");
     const double clock = lsl_rig_now() - rig.lsl.local_clock();
@@ -283,38 +307,55 @@ static pid_t guest;
 
 /* Takes what comes until there are `more` estimates than now. */
 static int hear(int32_t more) {
-    const int32_t n = atomic_load(&heard.n);
-    const double until = lsl_rig_now() + PATIENCE;
-    while (atomic_load(&heard.n) < n + more && lsl_rig_now() < until) {
-        receive(&heard, 0.1, n + more);
-    }
-    return atomic_load(&heard.n) >= n + more;
+    const int32_t enough = atomic_load(&heard.n) + more;
+    receive(&heard, PATIENCE, enough);
+    return atomic_load(&heard.n) >= enough;
 }
 
 static int32_t reached;
 
-static int replace_guest(int32_t losses, const char *rate, const char *label, const char *other,
-                         const char *said, int32_t times) {
+static const char *const back[] = {"'guest-markers' is back", "'guest-emg' is back"};
+
+static int wait_lost(void) {
+    const double until = lsl_rig_now() + PATIENCE;
+    while (!lsl_pacer_lost(&pacer) && lsl_rig_now() < until) {
+        lsl_rig_rest(0.005);
+    }
+    return lsl_pacer_lost(&pacer);
+}
+
+/* Both streams are lost, another sender comes, and both are back, of which `said` tells more. */
+static int replace_guest(const char *rate, const char *label, const char *other, const char *said) {
     kill_sender(guest);
-    if (!live_words_wait(&run.words, "'guest-markers' sends nothing any more", losses)) {
+    lsl_pacer_hold(&pacer);
+    if (!wait_lost()) {
         return 0;
     }
+    const int32_t before[] = {live_words_count(&run.words, back[0]),
+                              live_words_count(&run.words, back[1]),
+                              live_words_count(&run.words, said)};
     receive(&heard, 0.2, MOST); /* what was under way */
     guest = plain_sender("guest", rate, label, other);
-    return live_words_wait(&run.words, said, times) && hear(60);
+    if (!live_words_wait(&run.words, back[0], before[0] + 1) ||
+        !live_words_wait(&run.words, back[1], before[1] + 1) ||
+        !live_words_wait(&run.words, said, before[2] + 1)) {
+        return 0;
+    }
+    lsl_pacer_go(&pacer);
+    return hear(30);
 }
 
 static void *direct(void *data) {
-    (void)data;
     reached = 0;
-    if (open_receiver(&heard, "guest-out") && hear(60)) {
+    if (begin_sending(data) && hear(30)) {
         reached = 1;
-        reached += replace_guest(1, "2000", NULL, NULL, "'guest-emg' is back", 1);
+        reached += replace_guest("2000", NULL, NULL, "'guest-emg' is back");
         reached +=
-            replace_guest(2, "2000", "STYLr", "Elsewhere", "'guest-markers' is back with other", 1);
-        reached += replace_guest(3, "1000", NULL, NULL, "'guest-emg' is back with other", 1);
+            replace_guest("2000", "STYLr", "Elsewhere", "'guest-markers' is back with other");
+        reached += replace_guest("1000", NULL, NULL, "'guest-emg' is back with other");
     }
     mhe_live_stop(run.live);
+    lsl_pacer_stop(&pacer);
     return NULL;
 }
 

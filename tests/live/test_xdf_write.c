@@ -16,7 +16,8 @@ static void to_the_bit(void **state) {
     mhi_xdf_writer *w = NULL;
     mhi_xdf *back = NULL;
     mhe_error err = {0};
-    const mhi_xdf_column columns[] = {{"bic <1> & co", "V", NULL, NULL}, {"tri", NULL, NULL, NULL}};
+    const mhi_xdf_column columns[] = {{.label = "bic <1> & co", .unit = "V"},
+                                      {.label = "tri", .named = "1"}};
     const double stamps[] = {1.0 / 3, 2.0 / 3, 7.1}, values[] = {0.1, -1e-300, 3, 1e300, -0.0, 7};
     uint32_t id = 0;
     assert_int_equal(mhi_xdf_create(path, &w, &err), MHE_OK);

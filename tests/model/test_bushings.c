@@ -103,7 +103,7 @@ static void open_system(rig *r, const char *springs_yaml) {
     if (model == NULL || muscle == NULL || springs == NULL) {
         skip();
     }
-    const mhi_force_setup force = {springs, test_config(springs, springs_yaml)};
+    const mhi_force_setup force = {.plugin = springs, .config = test_config(springs, springs_yaml)};
     const mhi_system_setup setup = {.host = test_host(),
                                     .description = r->d,
                                     .model = model,

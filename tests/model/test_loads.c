@@ -75,7 +75,7 @@ static mhi_system *open_system(const mhe_description *d, const char *yaml, mhe_e
     if (model == NULL || muscle == NULL || loads == NULL) {
         skip();
     }
-    const mhi_force_setup force = {loads, test_config(loads, yaml)};
+    const mhi_force_setup force = {.plugin = loads, .config = test_config(loads, yaml)};
     const mhi_system_setup setup = {.host = test_host(),
                                     .description = d,
                                     .model = model,

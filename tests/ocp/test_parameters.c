@@ -25,6 +25,8 @@ static const char *const configs[] = {
     "model: {file: $ARM19}\nmuscle: {curves: degroote2016, tendon: elastic}\n"
     "costs: [{plugin: mhe.cost.emg-markers, markers: 0.1},\n"
     "  {plugin: mhe.cost.track, signal: markers, sigma: 0.1, huber: 1}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: paper2021, passive_ramp: 0.3}\n"
+    "costs: [{plugin: mhe.cost.emg-markers, markers: 0.1, emg_spread: 0.5}]\n",
 };
 
 typedef struct rig {

@@ -87,6 +87,7 @@ mhe_status live_rig_run(live_rig *r) {
         directed = r->director != NULL && pthread_create(&thread, NULL, r->director, r->data) == 0;
         status = mhe_live_run(r->live, r->seconds, &r->err);
     }
+    atomic_store(&r->over, 1);
     if (directed) {
         (void)pthread_join(thread, NULL);
     }
@@ -119,6 +120,28 @@ double live_rig_number(const char *json, const char *key) {
     const char *at = strstr(json, quoted);
     assert_non_null(at);
     return strtod(at + strlen(quoted), NULL);
+}
+
+double live_rig_state(live_rig *r, const char *key) {
+    char *json = NULL, quoted[64];
+    (void)snprintf(quoted, sizeof quoted, "\"%s\":", key);
+    const int known =
+        mhe_live_state(r->live, &json, NULL) == MHE_OK && strstr(json, quoted) != NULL;
+    const double value = known ? live_rig_number(json, key) : 0;
+    mhe_free(json);
+    return value;
+}
+
+int live_rig_wait_frames(live_rig *r, int32_t more) {
+    const struct timespec pause = {0, 10000000};
+    const double enough = live_rig_state(r, "frames") + more;
+    for (int32_t i = 0; i < (int32_t)(100 * PATIENCE); i++) {
+        if (live_rig_state(r, "frames") >= enough) {
+            return 1;
+        }
+        (void)nanosleep(&pause, NULL);
+    }
+    return 0;
 }
 
 double *live_rig_table(const char *name, const char *file, int32_t *n_rows, int32_t *n_columns) {

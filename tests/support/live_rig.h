@@ -9,6 +9,7 @@
 #include <mhe/library.h>
 #include <mhe/live.h>
 #include <pthread.h>
+#include <stdatomic.h>
 
 /* A folder of the test's own; "" where none can be made. Removed by live_rig_clean. */
 const char *live_rig_folder(void);
@@ -36,14 +37,20 @@ typedef struct live_rig {
     void *(*director)(void *data);
     void *data;
     live_words words;
-    mhe_live *live; /* while it runs */
-    char *summary;  /* JSON; free by mhe_free */
+    mhe_live *live;  /* while it runs, and until the director has returned */
+    atomic_int over; /* the run has ended; its sinks are still there */
+    char *summary;   /* JSON; free by mhe_free */
     mhe_error err;
 } live_rig;
 
 mhe_status live_rig_run(live_rig *rig);
 
 double live_rig_number(const char *json, const char *key); /* the first of that name */
+
+/* For directors: the same of the run's state; 0 where nothing is known yet. */
+double live_rig_state(live_rig *rig, const char *key);
+/* Waits until the run has taken `more` frames from now on; 0: it never did. */
+int live_rig_wait_frames(live_rig *rig, int32_t more);
 
 /* Runs, and fails the test where the run does. */
 void live_rig_must_run(live_rig *rig);

@@ -38,22 +38,34 @@ typedef struct mhe_stream_info {
     double rate;  /* nominal, Hz; 0: irregular */
     int32_t up;   /* markers: the vertical axis, 0..2; -1: the sender does not say */
     double delay; /* s that its stamps are known to be late by, beside the config's `delay` */
+    const uint8_t *named; /* [n_channels] 1: the label is what the model calls it, whatever
+                           * data.labels and data.subject say; NULL: none is */
 } mhe_stream_info;
 
 /* The work that a frame was granted, in a recording of ours: what a replay obeys, so that it looks
  * at no clock. */
 #define MHE_GRANT_LOOKS 8
 #define MHE_GRANT_PASSED_OVER 2
+#define MHE_GRANT_STOPPED 3
 typedef struct mhe_grant {
     int64_t arrival;  /* number of the packet that the frame's sample came in */
     int32_t prepared; /* 1: its window was prepared ahead of it; MHE_GRANT_PASSED_OVER: it was not
-                       * taken at all, since the run was behind */
+                       * taken at all, since the run was behind; MHE_GRANT_STOPPED: the run was
+                       * stopped while it was estimated, nothing came of it */
     int32_t by_clock; /* 1: it had a deadline */
     int32_t
         refused; /* looks at the clock before an evaluation was broken off by it; -1: none was */
     int32_t looks[MHE_GRANT_LOOKS]; /* looks at the clock that found time left, then such that found
                                      * none, then time again, ... */
 } mhe_grant;
+
+/* An electrode's largest envelope that was found while a recording of ours was made: its EMG is
+ * relative to it from then on. */
+typedef struct mhe_maximum {
+    int64_t arrival; /* number of the packet that was taken next */
+    double value;    /* in the channel's unit */
+    int32_t channel; /* of the config's emg.channels */
+} mhe_maximum;
 
 /* Samples of one stream; lent for the call. */
 typedef struct mhe_chunk {
@@ -66,7 +78,10 @@ typedef struct mhe_chunk {
     const double *values; /* [n x n_channels], NaN: missing */
     int32_t n_grants;     /* frames that were estimated of these samples when they were recorded */
     uint32_t grant_size;  /* stride of `grants` */
-    const mhe_grant *grants; /* [n_grants]; NULL: these are no repetition */
+    const mhe_grant *grants;   /* [n_grants]; NULL: these are no repetition */
+    int32_t n_maxima;          /* that were found before these samples when they were recorded */
+    uint32_t maximum_size;     /* stride of `maxima` */
+    const mhe_maximum *maxima; /* [n_maxima]; NULL: there are none */
 } mhe_chunk;
 
 #define MHE_SOURCE_LOST 0    /* the stream broke off; the source goes on trying */
@@ -137,6 +152,9 @@ typedef struct mhe_recorded {
     int64_t n_grants; /* in the order of their arrivals */
     uint32_t grant_size;
     const mhe_grant *grants;
+    int64_t n_maxima; /* in the order of their arrivals */
+    uint32_t maximum_size;
+    const mhe_maximum *maxima;
 } mhe_recorded;
 
 typedef struct mhe_recorded_service {

@@ -31,12 +31,14 @@ typedef struct mhi_motion {
     mhi_recording *recording;
     const mhi_plan_recording *plan;
     mhi_run run;     /* the config's with this recording's files */
+    int32_t force;   /* of the system: its external loads; -1: it has none */
     int32_t n_nodes; /* every ratio-th frame */
     int32_t first;   /* node in the problem; -1: held out */
 } mhi_motion;
 
 typedef struct mhi_calibration {
     const mhi_run *run, *start;
+    const mhi_use *persons_solver; /* for the config that is left behind; NULL: the run's. Lent */
     mhi_plan plan;
     const mhe_host *host;
     mhe_description *model; /* as it is in the file */
@@ -60,8 +62,8 @@ typedef struct mhi_calibration {
 
 /* Reads everything; `run`, `start` and `host` lent. `start`: the same config with costs that find a
  * motion with a model that is wrong. MHE_E_CONFIG, MHE_E_INPUT: one line. [cold] */
-mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_host *host,
-                                mhi_calibration *calibration, mhe_error *err);
+mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry *registry,
+                                const mhe_host *host, mhi_calibration *calibration, mhe_error *err);
 void mhi_calibration_close(mhi_calibration *calibration);
 /* Finds the parameters and how well they are known. [cold] */
 mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);
@@ -83,6 +85,12 @@ mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err
 mhe_status mhi_motion_read(mhi_calibration *c, int32_t i, mhe_error *err);
 mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t n_u, double *x,
                             double *u, mhe_error *err);
+/* loads.c: the forces of the config, and then one for the loads of each recording that has some;
+ * taken from the arena. What acts at every node. */
+mhe_status mhi_motion_forces(mhi_calibration *c, mhi_force_setup **forces, int32_t *n,
+                             mhe_error *err);
+mhe_status mhi_motion_loads(const mhi_calibration *c, const mhi_system *system, mhi_ocp *ocp,
+                            mhe_error *err);
 /* EMG that the controls of node k are compared with, as it was `delay` (s) before: a smooth
  * function of the delay. NaN: missing. */
 double mhi_motion_emg_before(const mhi_calibration *c, const mhi_motion *motion, int32_t k,

@@ -10,11 +10,8 @@ mhe_status mhi_motion_read(mhi_calibration *c, int32_t i, mhe_error *err) {
     m->plan = &c->plan.recordings[i];
     m->run = *c->run;
     m->first = -1;
-    m->run.data.markers = m->plan->markers;
-    m->run.data.emg = m->plan->emg;
-    m->run.data.angles = m->plan->angles;
-    m->run.data.reference = m->plan->reference;
-    m->run.data.emg_offset = m->plan->emg_offset;
+    m->force = -1;
+    mhi_plan_take(m->plan, &m->run);
     mhe_status status = mhi_recording_read(&m->run, c->model, c->host, &m->recording, err);
     if (status == MHE_OK) {
         m->n_nodes = (m->recording->n_frames - 1) / c->run->horizon.ratio + 1;
@@ -46,7 +43,7 @@ mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t 
     mhe_estimator *e = NULL;
     int32_t found = 0;
     mhi_run run = *c->start;
-    run.data = m->run.data;
+    mhi_plan_take(m->plan, &run);
     mhe_status status = mhi_estimator_create_on(&run, c->model, c->host, &e, err);
     if (status == MHE_OK) { /* first activations are held where it finds them */
         mhi_estimator_set_seen(e);

@@ -42,6 +42,8 @@ static const mhe_option recording_options[] = {
     MHE_OPT_PATH(mhi_plan_recording, emg, 0, "EMG, as data.emg."),
     MHE_OPT_PATH(mhi_plan_recording, angles, 0, "Joint angles, as data.angles."),
     MHE_OPT_PATH(mhi_plan_recording, reference, 0, "The truth, where it is known."),
+    MHE_OPT_PATH(mhi_plan_recording, external_loads, 0,
+                 "Loads that act in it (ground, a weight in the hand), as data.external_loads."),
     MHE_OPT_REAL(mhi_plan_recording, emg_offset, 0, -1e9, 1e9, "s", "As data.emg_offset."),
     MHE_OPT_BOOL(mhi_plan_recording, hold_out, 0,
                  "Nothing is learned from it: it shows what the calibration is worth."),
@@ -136,10 +138,16 @@ static mhe_status read_entries(mhi_run *run, const mhi_node *list, mhi_plan *pla
     return status;
 }
 
-static mhe_status read_recordings(mhi_run *run, const mhi_node *list, mhi_plan *plan,
-                                  mhe_error *err) {
+static mhe_status read_recordings(mhi_run *run, mhi_registry *registry, const mhi_node *list,
+                                  mhi_plan *plan, mhe_error *err) {
     const mhi_data_section *data = &run->data;
-    const int32_t own = data->markers != NULL || data->emg != NULL || data->angles != NULL;
+    const int32_t own = data->markers != NULL || data->angles != NULL;
+    if (data->emg != NULL && !own) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree,
+                           mhi_node_find(mhi_tree_root(run->tree), "data"),
+                           "data: emg without 'markers' or 'angles': there is no motion to learn "
+                           "from");
+    }
     if (list != NULL && list->kind != MHI_SEQUENCE) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, list,
                            "calibrate.recordings: must be a list: [{markers: FILE, emg: FILE}, "
@@ -151,8 +159,14 @@ static mhe_status read_recordings(mhi_run *run, const mhi_node *list, mhi_plan *
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     if (own) {
-        plan->recordings[plan->n_recordings++] = (mhi_plan_recording){
-            data->markers, data->emg, data->angles, data->reference, data->emg_offset, 0, NULL};
+        plan->recordings[plan->n_recordings++] =
+            (mhi_plan_recording){.markers = data->markers,
+                                 .emg = data->emg,
+                                 .angles = data->angles,
+                                 .reference = data->reference,
+                                 .external_loads = data->external_loads,
+                                 .emg_offset = data->emg_offset,
+                                 .loads = run->external_loads};
     }
     mhe_status status = MHE_OK;
     for (mhi_node *node = list == NULL ? NULL : list->first; node != NULL && status == MHE_OK;
@@ -161,6 +175,15 @@ static mhe_status read_recordings(mhi_run *run, const mhi_node *list, mhi_plan *
         status = mhi_options_fill(recording_options, N(recording_options), run->tree, node, NULL, 0,
                                   "calibrate.recordings", run->dir, &run->arena, r, err);
         r->node = node;
+        if (status == MHE_OK && r->markers == NULL && r->angles == NULL) {
+            status = mhi_fail_at(err, MHE_E_CONFIG, run->tree, node,
+                                 "calibrate.recordings: neither 'markers' nor 'angles' is given: "
+                                 "there is no motion to learn from");
+        }
+        if (status == MHE_OK && r->external_loads != NULL) {
+            status = mhi_run_read_loads(run, registry, r->external_loads,
+                                        mhi_node_find(node, "external_loads"), &r->loads, err);
+        }
     }
     int32_t n = 0;
     for (int32_t i = 0; i < plan->n_recordings; i++) {
@@ -173,7 +196,17 @@ static mhe_status read_recordings(mhi_run *run, const mhi_node *list, mhi_plan *
                : status;
 }
 
-mhe_status mhi_plan_read(mhi_run *run, mhi_plan *plan, mhe_error *err) {
+void mhi_plan_take(const mhi_plan_recording *recording, mhi_run *run) {
+    run->data.markers = recording->markers;
+    run->data.emg = recording->emg;
+    run->data.angles = recording->angles;
+    run->data.reference = recording->reference;
+    run->data.external_loads = recording->external_loads;
+    run->data.emg_offset = recording->emg_offset;
+    run->external_loads = recording->loads;
+}
+
+mhe_status mhi_plan_read(mhi_run *run, mhi_registry *registry, mhi_plan *plan, mhe_error *err) {
     static const char *const lists[] = {"recordings", "parameters"};
     const mhi_node *section = mhi_node_find(mhi_tree_root(run->tree), "calibrate");
     *plan = (mhi_plan){0};
@@ -185,7 +218,7 @@ mhe_status mhi_plan_read(mhi_run *run, mhi_plan *plan, mhe_error *err) {
     mhe_status status = mhi_options_fill(plan_options, N(plan_options), run->tree, section, lists,
                                          2, "calibrate", run->dir, &run->arena, plan, err);
     if (status == MHE_OK) {
-        status = read_recordings(run, mhi_node_find(section, "recordings"), plan, err);
+        status = read_recordings(run, registry, mhi_node_find(section, "recordings"), plan, err);
     }
     return status == MHE_OK ? read_entries(run, mhi_node_find(section, "parameters"), plan, err)
                             : status;

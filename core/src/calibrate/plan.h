@@ -30,9 +30,10 @@
 extern const char *const mhi_plan_names[MHI_OF_KINDS];
 
 typedef struct mhi_plan_recording {
-    const char *markers, *emg, *angles, *reference;
+    const char *markers, *emg, *angles, *reference, *external_loads;
     double emg_offset;
     int32_t hold_out;
+    mhi_use loads;        /* what reads external_loads; plugin NULL: none act */
     const mhi_node *node; /* NULL: that of the data section */
 } mhi_plan_recording;
 
@@ -59,7 +60,9 @@ typedef struct mhi_plan {
 } mhi_plan;
 
 /* Of the tree that `run` was read from; lists live in its arena. MHE_E_CONFIG: one line. [cold] */
-mhe_status mhi_plan_read(mhi_run *run, mhi_plan *plan, mhe_error *err);
+mhe_status mhi_plan_read(mhi_run *run, mhi_registry *registry, mhi_plan *plan, mhe_error *err);
+/* A recording's files in the place of the run's. */
+void mhi_plan_take(const mhi_plan_recording *recording, mhi_run *run);
 /* Every key, for people. */
 void mhi_plan_describe(mhi_text *out);
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "calibrate/calibrate.h"
 #include "estimator/create.h"
+#include "estimator/tasks.h"
 #include "io/model_file.h"
 #include "model/anatomy.h"
 #include "model/bounds.h"
@@ -68,18 +69,11 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhi_run *run = c->run;
     const char *names[5];
     int32_t n_names = 0;
-    mhi_force_setup *forces = MHI_TAKE(&c->arena, mhi_force_setup, run->forces.n + 1);
-    if (forces == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    for (int32_t i = 0; i < run->forces.n; i++) {
-        forces[i] = (mhi_force_setup){run->forces.uses[i].plugin, run->forces.uses[i].config};
-    }
-    if (run->external_loads.plugin != NULL) {
-        return mhe_fail(err, MHE_E_UNSUPPORTED,
-                        "%s: data.external_loads: recordings with external loads cannot be "
-                        "calibrated from",
-                        run->path);
+    mhi_force_setup *forces = NULL;
+    int32_t n_forces = 0;
+    mhe_status status = mhi_motion_forces(c, &forces, &n_forces, err);
+    if (status != MHE_OK) {
+        return status;
     }
     for (int32_t i = MHI_OF_STRENGTH; i <= MHI_OF_SLACK; i++) {
         if (c->asked[i]) {
@@ -100,7 +94,7 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                            "model.paths: where insertions are estimated paths must be exact");
     }
     mhi_bounds bounds;
-    mhe_status status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
+    status = mhi_bounds_read(run, c->model, &c->arena, &bounds, err);
     const mhi_system_setup setup = {.host = c->host,
                                     .description = c->model,
                                     .model = run->model.plugin,
@@ -109,8 +103,9 @@ static mhe_status open_system(mhi_calibration *c, problem *p, mhe_error *err) {
                                     .muscle_config = run->muscle.config,
                                     .formulation = run->formulation,
                                     .residual_torques = run->bounds.residual_torques,
+                                    .actuators = run->bounds.actuators,
                                     .forces = forces,
-                                    .n_forces = run->forces.n,
+                                    .n_forces = n_forces,
                                     .bounds = &bounds,
                                     .parameters = names,
                                     .n_parameters = n_names};
@@ -151,6 +146,11 @@ static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
                             m->run.data.markers, m->recording->rate, r->rate);
         }
     }
+    const mhi_tasks *tasks = NULL;
+    const mhe_status status = mhi_tasks_read(run, c->model, NULL, &c->arena, &tasks, err);
+    if (status != MHE_OK) {
+        return status;
+    }
     c->setup.emg_before = emg_before;
     c->setup.emg = c;
     const mhi_ocp_setup setup = {.host = c->host,
@@ -159,6 +159,7 @@ static mhe_status open_ocp(mhi_calibration *c, problem *p, mhe_error *err) {
                                  .integrator_config = run->integrator.config,
                                  .terms = terms,
                                  .n_terms = run->n_costs,
+                                 .tasks = tasks,
                                  .n_intervals = c->n_intervals,
                                  .interval = interval,
                                  .n_workers = run->realtime.threads,
@@ -217,12 +218,15 @@ static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junc
     }
 }
 
-/* Of a motion's first activations and fibre lengths (m), about where they were found. */
-#define FIRST_SD 0.1
+/* Of a motion's first activations and fibre lengths (m), about where they were found. Activations
+ * may be anywhere within their bounds: the estimator finds them with the wrong model, and what
+ * holds them there moves what else explains the first moments, a delay above all (by 6 ms at 0.1).
+ */
+#define FIRST_SD 1.0
 #define FIRST_LENGTH_SD 0.01
 
 /* Nothing tells the first activations of redundant muscles apart but what comes before: they stay
- * near those of the start. */
+ * near those of the start, as far as the motion says nothing of them. */
 static mhe_status hold_beginnings(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_system *f = mhi_system_face(p->system);
     double *weight = MHI_TAKE(&c->arena, double, f->n_x);
@@ -306,6 +310,7 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
                                       p->s.u + (ptrdiff_t)m->first * f->n_u, err);
         }
     }
+    status = status == MHE_OK ? mhi_motion_loads(c, p->system, p->ocp, err) : status;
     if (status == MHE_OK) {
         set_spread(c, p->ocp);
         status = hold_beginnings(c, p, err);
@@ -333,7 +338,8 @@ static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
         const double margin = 1e-4 * (e->upper - e->lower);
         e->at_bound = e->value < e->lower + margin || e->value > e->upper - margin;
         e->sd = p->solver->covariance == NULL ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
-        e->informed = e->at_bound || !(e->sd > 0.95 * e->prior_sd);
+        e->informed =
+            e->at_bound || !(e->sd > 0.95 * e->prior_sd) || fabs(e->value - e->mean) > e->prior_sd;
         if (e->at_bound) {
             e->sd = 0;
         }
@@ -342,6 +348,19 @@ static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
         }
     }
     return status;
+}
+
+/* Where the config names what refuses: the loads of a recording, or what every run has. */
+static mhe_status locate(const mhi_calibration *c, mhe_status status, mhe_error *err) {
+    const int32_t of_force = err->part == MHE_PART_FORCE && err->entry >= c->run->forces.n;
+    for (int32_t i = 0; i < c->plan.n_recordings && of_force; i++) {
+        const mhi_use *loads = &c->plan.recordings[i].loads;
+        if (c->motions[i].force == err->entry && loads->node != NULL) {
+            const mhe_error why = *err;
+            return mhi_fail_at(err, status, c->run->tree, loads->node, "%s", why.text);
+        }
+    }
+    return of_force ? status : mhi_estimator_locate(c->run, status, err);
 }
 
 mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
@@ -353,6 +372,7 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     if (status == MHE_OK) {
         status = open_ocp(c, &p, err);
     }
+    status = status == MHE_OK ? MHE_OK : locate(c, status, err);
     if (status == MHE_OK) {
         status = start_problem(c, &p, err);
     }
@@ -372,10 +392,27 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     return status;
 }
 
-mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_host *host,
-                                mhi_calibration *c, mhe_error *err) {
+/* What is asked of EMG needs some. */
+static mhe_status check_emg(const mhi_calibration *c, mhe_error *err) {
+    int32_t has = 0;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        has |= !c->plan.recordings[i].hold_out && c->motions[i].recording->emg != NULL;
+    }
+    for (int32_t i = 0; i < c->plan.n_entries && !has; i++) {
+        const mhi_plan_entry *e = &c->plan.entries[i];
+        if (e->kind == MHI_OF_GAIN || e->kind == MHI_OF_SHAPE || e->kind == MHI_OF_DELAY) {
+            return mhi_fail_at(err, MHE_E_CONFIG, c->run->tree, e->node,
+                               "calibrate.parameters: %s: no recording to learn from has EMG",
+                               mhi_plan_names[e->kind]);
+        }
+    }
+    return MHE_OK;
+}
+
+mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry *registry,
+                                const mhe_host *host, mhi_calibration *c, mhe_error *err) {
     *c = (mhi_calibration){.run = run, .start = start, .host = host};
-    mhe_status status = mhi_plan_read(run, &c->plan, err);
+    mhe_status status = mhi_plan_read(run, registry, &c->plan, err);
     if (status == MHE_OK) {
         status = mhi_estimator_read_model(run, host, &c->model, err);
     }
@@ -389,6 +426,7 @@ mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, const mhe_ho
     for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
         status = mhi_motion_read(c, i, err);
     }
+    status = status == MHE_OK ? check_emg(c, err) : status;
     return status == MHE_OK ? mhi_calibration_check_person(c, err) : status;
 }
 

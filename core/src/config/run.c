@@ -203,6 +203,12 @@ mhe_status mhi_run_read_costs(mhi_run *run, mhi_registry *registry, const mhi_no
     return mhi_read_costs(&reader, owner, mhi_node_find(owner, "costs"), costs, n);
 }
 
+mhe_status mhi_run_read_loads(mhi_run *run, mhi_registry *registry, const char *file,
+                              const mhi_node *key, mhi_use *use, mhe_error *err) {
+    const mhi_reader reader = {run, registry, err, MHI_SCOPE_ALL};
+    return mhi_read_loads(&reader, file, key, use);
+}
+
 void mhi_run_free(mhi_run *run) {
     if (run != NULL) {
         mhi_tree_free(run->tree);

@@ -239,6 +239,10 @@ mhe_status mhi_run_read_base(const char *path, const char *const *set, int32_t n
 /* The list `costs` in a mapping of the run's tree; the uses live as long as the run. [cold] */
 mhe_status mhi_run_read_costs(mhi_run *run, mhi_registry *registry, const mhi_node *owner,
                               mhi_use **costs, int32_t *n, mhe_error *err);
+/* What reads the external loads of `file`, in the laboratory's frame (data.transform), as
+ * data.external_loads; `key`: where the run's tree names it. [cold] */
+mhe_status mhi_run_read_loads(mhi_run *run, mhi_registry *registry, const char *file,
+                              const mhi_node *key, mhi_use *use, mhe_error *err);
 void mhi_run_free(mhi_run *run);
 
 /* "plugin: ...", its own keys and the section's of the model section, behind `indent` blanks. */

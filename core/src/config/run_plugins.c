@@ -5,6 +5,7 @@
 #include "config/run_reader.h"
 #include "config/run_sections.h"
 
+#include <mhe/force.h>
 #include <mhe/model.h>
 #include <string.h>
 
@@ -204,6 +205,23 @@ static mhe_status read_other_force(const mhi_reader *r, const mhi_section *secti
     return status;
 }
 
+mhe_status mhi_read_loads(const mhi_reader *r, const char *file, const mhi_node *key,
+                          mhi_use *use) {
+    const char **ids = NULL;
+    int32_t n = 0;
+    const mhi_section *section = mhi_run_sections(&n);
+    while (section->iface == NULL || strcmp(section->iface, MHE_FORCE_IFACE) != 0) {
+        section++;
+    }
+    const mhe_status status =
+        mhi_default_plugins("external_loads", &r->run->arena, &ids, &n, r->err);
+    return status != MHE_OK ? status
+           : n == 0
+               ? mhi_fail_at(r->err, MHE_E_CONFIG, r->run->tree, key,
+                             "external_loads: defaults.yaml names no plugin that reads such files")
+               : read_other_force(r, section, ids[0], file, key, use);
+}
+
 /* The list, or where there is none what acts by default as far as it is installed; then
  * data.external_loads. */
 static mhe_status read_forces(const mhi_reader *r, const mhi_section *section,
@@ -238,14 +256,7 @@ static mhe_status read_forces(const mhi_reader *r, const mhi_section *section,
     }
     const mhi_node *data = mhi_reader_section(run, "data");
     const mhi_node *key = data == NULL ? NULL : mhi_node_find(data, "external_loads");
-    status = mhi_default_plugins("external_loads", &run->arena, &ids, &n, r->err);
-    if (status == MHE_OK && n == 0) {
-        return mhi_fail_at(r->err, MHE_E_CONFIG, run->tree, key,
-                           "data.external_loads: defaults.yaml names no plugin that reads it");
-    }
-    return status != MHE_OK ? status
-                            : read_other_force(r, section, ids[0], run->data.external_loads, key,
-                                               &run->external_loads);
+    return mhi_read_loads(r, run->data.external_loads, key, &run->external_loads);
 }
 
 static mhe_status read_plugin_section(const mhi_reader *r, const mhi_section *s) {

@@ -22,6 +22,8 @@ mhi_node *mhi_reader_section(const mhi_run *run, const char *name);
 /* run_plugins.c: all sections that name a plugin, or the one with this interface; and costs, where
  * `owner` stands for the list in messages if that is missing (NULL). */
 mhe_status mhi_read_plugin_sections(const mhi_reader *r, const char *iface);
+/* What reads the external loads of `file`; `key`: where the tree names it. */
+mhe_status mhi_read_loads(const mhi_reader *r, const char *file, const mhi_node *key, mhi_use *use);
 mhe_status mhi_read_costs(const mhi_reader *r, const mhi_node *owner, const mhi_node *list,
                           mhi_use **uses, int32_t *n_uses);
 

@@ -319,6 +319,17 @@ void mhi_electrodes_mean(const mhi_electrodes *e, double time, double span, doub
     }
 }
 
+int32_t mhi_electrodes_set_mvc(mhi_electrodes *e, const mhi_run *run, int32_t channel, double mvc) {
+    if (channel < 0 || channel >= e->n_channels || e->column[channel] < 0 || !(mvc > 0) ||
+        !isfinite(mvc)) {
+        return 0;
+    }
+    const double scale = run->emg.channels[channel].gain / mvc;
+    e->peaks[channel] *= scale / e->scale[channel];
+    e->scale[channel] = scale;
+    return 1;
+}
+
 int32_t mhi_electrodes_peak(mhi_electrodes *e, int32_t channel, int32_t reset, double *peak) {
     if (channel < 0 || channel >= e->n_channels || e->column[channel] < 0) {
         return 0;

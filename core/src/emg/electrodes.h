@@ -49,6 +49,10 @@ void mhi_electrodes_mean(const mhi_electrodes *electrodes, double time, double s
  * the search begins anew. 0: it is no column. [any] */
 int32_t mhi_electrodes_peak(mhi_electrodes *electrodes, int32_t channel, int32_t reset,
                             double *peak);
+/* The EMG of a channel is relative to another maximum from the next sample on. 0: it is no column,
+ * or the value is no maximum. [any] */
+int32_t mhi_electrodes_set_mvc(mhi_electrodes *electrodes, const mhi_run *run, int32_t channel,
+                               double mvc);
 /* Delay of the filters, and the part of it beyond the electromechanical delay, s. [any] */
 double mhi_electrodes_filter_delay(const mhi_electrodes *electrodes);
 double mhi_electrodes_lag(const mhi_electrodes *electrodes);

@@ -90,16 +90,26 @@ void mhi_window_set_bounds(mhe_estimator *e) {
     }
 }
 
+/* How far markers are off: from the postures nearest to them where these are looked for, else from
+ * the estimates, which muscles pull. */
+static double misfit(const mhe_estimator *e, const mhi_channel *markers) {
+    if (e->rates.start != NULL) {
+        return mhi_rates_misfit(&e->rates);
+    }
+    return markers->n_misfit > 0 ? sqrt(markers->misfit / markers->n_misfit) : NAN;
+}
+
 void mhi_window_set_targets(mhe_estimator *e) {
     for (int32_t i = 0; i < e->channels.n;
          i++) { /* of EMG, for costs that ask how much of it is noise */
         mhi_channel *c = &e->channels.rows[i];
         if (c->read && c->signal >= 0 && !c->posture) {
             mhi_channel_spread(c, e->window.filled, mhi_ocp_target_spread(e->ocp, c->signal));
-        } else if (c->read && c->signal == MHI_SIGNAL_MARKERS && c->n_misfit > 0) {
+        } else if (c->read && c->signal == MHI_SIGNAL_MARKERS) {
             double *spread = mhi_ocp_target_spread(e->ocp, c->signal);
+            const double off = misfit(e, c);
             for (int32_t j = 0; j < c->face.width; j++) {
-                spread[j] = sqrt(c->misfit / c->n_misfit);
+                spread[j] = off;
             }
         }
     }

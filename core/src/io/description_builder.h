@@ -45,8 +45,9 @@ typedef struct mhi_body_draft {
 
 typedef struct mhi_coordinate_draft {
     mhe_coordinate coordinate;
-    int32_t locked;        /* stays at its default value */
-    int32_t moves_nothing; /* for the builder: no body, and no other coordinate */
+    const char *joint, *in_joint; /* for the reader: its joint, and its name there */
+    int32_t locked;               /* stays at its default value */
+    int32_t moves_nothing;        /* for the builder: no body, and no other coordinate */
     int32_t line;
 } mhi_coordinate_draft;
 
@@ -67,8 +68,9 @@ typedef struct mhi_obstacle_draft {
     mhe_obstacle obstacle;
     const char *body;
     int32_t line;
-    int32_t active; /* 0: paths pass through it */
-    int32_t used;   /* by a path that is there */
+    int32_t active;      /* 0: paths pass through it */
+    int32_t used;        /* by a path that is there */
+    const char *unknown; /* its type, where it is none of ours; NULL */
 } mhi_obstacle_draft;
 
 typedef struct mhi_wrap_draft {
@@ -170,6 +172,11 @@ void mhi_build_motion(mhi_builder *b, mhi_body_draft *body, int32_t kind, int32_
 
 /* description_check.c: what no mechanics could use is refused. */
 void mhi_build_check(mhi_builder *b);
+/* Warns where the `range` of `whose` can only be degrees: angles are in rad. */
+void mhi_build_warn_degrees(mhi_builder *b, int32_t line, const char *whose,
+                            const mhe_coordinate *coordinate, const double range[2]);
+/* Of it, the names of bodies: a reader whose joints name bodies asks before it reads them. */
+void mhi_build_check_bodies(mhi_builder *b);
 /* Index of the draft of the body `name`, -1: ground; -2 after an error that says `what` `whose`
  * wanted it. */
 int32_t mhi_build_find_body(mhi_builder *b, const char *name, int32_t line, const char *what,

@@ -12,6 +12,10 @@
 #define MARKER(b, i) ((mhi_marker_draft *)(b)->markers.items[i])
 #define MUSCLE(b, i) ((mhi_muscle_draft *)(b)->muscles.items[i])
 #define GROUND (-1)
+#define TURNS 10.0         /* rad: no joint turns further */
+#define MOST_DEGREES 720.0 /* larger numbers say "without end" */
+#define ROUNDED 1e-6
+#define FAR 20.0 /* m */
 
 int32_t mhi_build_find_body(mhi_builder *b, const char *name, int32_t line, const char *what,
                             const char *whose) {
@@ -40,6 +44,9 @@ int32_t mhi_build_find_body(mhi_builder *b, const char *name, int32_t line, cons
 
 /* Names become columns of tables, lines of messages, words of other programs. */
 static void check_name(mhi_builder *b, const char *what, const char *name, int32_t line) {
+    if (*name == '\0') {
+        mhi_build_fail(b, line, "this %s has no name", what);
+    }
     for (const char *c = name; *c != '\0' && b->status == MHE_OK; c++) {
         if ((unsigned char)*c < ' ' || *c == 127) {
             mhi_build_fail(
@@ -89,6 +96,7 @@ static void drop_double_markers(mhi_builder *b) {
     for (int32_t i = 0; i < b->markers.n; i++) {
         const mhi_marker_draft *marker = MARKER(b, i);
         int32_t k = 0;
+        check_name(b, "marker", marker->name, marker->point.line);
         while (k < kept && strcmp(MARKER(b, k)->name, marker->name) != 0) {
             k++;
         }
@@ -130,9 +138,8 @@ static void check_inertia(mhi_builder *b, mhi_body_draft *draft) {
         fmin(fmin(m[0] * m[4] - m[1] * m[1], m[0] * m[8] - m[2] * m[2]), m[4] * m[8] - m[5] * m[5]);
     double det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
                  m[2] * (m[3] * m[7] - m[4] * m[6]);
-    if (fmin(fmin(m[0], m[4]), m[8]) < 0) {
-        mhi_build_fail(b, draft->line, "the inertia of body '%s' is not positive", body->name);
-    } else if (minor < -slack * scale || det < -slack * scale * scale) {
+    if (fmin(fmin(m[0], m[4]), m[8]) < 0 || minor < -slack * scale ||
+        det < -slack * scale * scale) {
         mhi_build_warn(b, draft->line,
                        "the inertia of body '%s' is not positive about every axis: kept, as "
                        "OpenSim does",
@@ -160,6 +167,13 @@ static void check_muscle(mhi_builder *b, const mhi_muscle_draft *draft) {
         {"maximal velocity", m->max_contraction_velocity, m->max_contraction_velocity <= 0},
         {"activation time", m->activation_time, m->activation_time <= 0},
         {"deactivation time", m->deactivation_time, m->deactivation_time <= 0},
+        {"fibre damping", m->fiber_damping, m->fiber_damping < 0},
+        {"passive strain", m->passive_strain, m->passive_strain <= 0},
+        {"passive shape", m->passive_shape, m->passive_shape <= 0},
+        {"active shape", m->active_shape, m->active_shape <= 0},
+        {"force-velocity shape", m->velocity_shape, m->velocity_shape <= 0},
+        {"maximal lengthening force", m->max_lengthening_force, m->max_lengthening_force <= 1},
+        {"tendon strain", m->tendon_strain, m->tendon_strain <= 0},
     };
     for (size_t i = 0; i < sizeof checks / sizeof *checks; i++) {
         if (checks[i].wrong) {
@@ -173,8 +187,68 @@ static void check_muscle(mhi_builder *b, const mhi_muscle_draft *draft) {
     }
 }
 
-void mhi_build_check(mhi_builder *b) {
+void mhi_build_warn_degrees(mhi_builder *b, int32_t line, const char *whose,
+                            const mhe_coordinate *coordinate, const double range[2]) {
+    const double largest = fmax(fabs(range[0]), fabs(range[1]));
+    if (coordinate->rotational && largest > TURNS && largest <= MOST_DEGREES) {
+        mhi_build_warn(b, line, "%s: its range is taken as %g to %g rad; is it in degrees?", whose,
+                       range[0], range[1]);
+    }
+}
+
+static void check_coordinate(mhi_builder *b, const mhi_coordinate_draft *draft) {
+    const mhe_coordinate *c = &draft->coordinate;
+    const double range[2] = {c->lower, c->upper};
+    const char *whose = mhi_arena_format(&b->arena, "coordinate '%s'", c->name);
+    if (!(c->lower <= c->upper)) {
+        mhi_build_fail(b, draft->line,
+                       "the range of coordinate '%s' ends (%g) before it begins (%g)", c->name,
+                       c->upper, c->lower);
+        return;
+    }
+    mhi_build_warn_degrees(b, draft->line, whose != NULL ? whose : "", c, range);
+    if (!draft->locked && (c->value < c->lower - ROUNDED || c->value > c->upper + ROUNDED)) {
+        mhi_build_warn(b, draft->line,
+                       "coordinate '%s' has the default %g, which its range of %g to %g excludes",
+                       c->name, c->value, c->lower, c->upper);
+    }
+}
+
+/* Lengths are in m; what lies across the street was written in mm. */
+static void warn_far(mhi_builder *b, int32_t line, const char *what, const char *name,
+                     const double at[3]) {
+    const double far = hypot(hypot(at[0], at[1]), at[2]);
+    if (far > FAR) {
+        mhi_build_warn(b, line, "%s '%s' lies %g m from its frame; is it in mm?", what, name, far);
+    }
+}
+
+static void check_places(mhi_builder *b) {
+    for (int32_t i = 0; i < b->bodies.n; i++) {
+        const mhi_body_draft *draft = BODY(b, i);
+        warn_far(b, draft->line, "the mass centre of body", draft->body.name, draft->body.com);
+        warn_far(b, draft->line, "the joint of body", draft->body.name, draft->body.joint_p);
+        warn_far(b, draft->line, "the joint's frame in body", draft->body.name, draft->body.body_p);
+    }
+    for (int32_t i = 0; i < b->markers.n; i++) {
+        const mhi_marker_draft *draft = MARKER(b, i);
+        warn_far(b, draft->point.line, "marker", draft->name, draft->point.point.location);
+    }
+    for (int32_t i = 0; i < b->muscles.n; i++) {
+        const mhi_path_draft *path = &MUSCLE(b, i)->path;
+        for (int32_t k = 0; k < path->points.n; k++) {
+            const mhi_point_draft *draft = path->points.items[k];
+            warn_far(b, draft->line, "a point of muscle", path->name, draft->point.location);
+        }
+    }
+}
+
+void mhi_build_check_bodies(mhi_builder *b) {
     check_unique(b, "body", b->bodies.n, body_name);
+}
+
+void mhi_build_check(mhi_builder *b) {
+    mhi_build_check_bodies(b);
     check_unique(b, "coordinate", b->coordinates.n, coordinate_name);
     drop_double_markers(b);
     check_unique(b, "muscle", b->muscles.n, muscle_name);
@@ -184,14 +258,10 @@ void mhi_build_check(mhi_builder *b) {
         check_inertia(b, BODY(b, i));
     }
     for (int32_t i = 0; i < b->coordinates.n; i++) {
-        const mhe_coordinate *c = &COORDINATE(b, i)->coordinate;
-        if (!(c->lower <= c->upper)) {
-            mhi_build_fail(b, COORDINATE(b, i)->line,
-                           "the range of coordinate '%s' ends (%g) before it begins (%g)", c->name,
-                           c->upper, c->lower);
-        }
+        check_coordinate(b, COORDINATE(b, i));
     }
     for (int32_t i = 0; i < b->muscles.n; i++) {
         check_muscle(b, MUSCLE(b, i));
     }
+    check_places(b);
 }

@@ -65,6 +65,18 @@ static mhi_obstacle_draft *find_obstacle(mhi_builder *b, const mhi_wrap_draft *w
     return NULL;
 }
 
+/* Paths know obstacles by their names alone. */
+static void warn_of_second(mhi_builder *b, const mhi_obstacle_draft *first) {
+    for (int32_t i = 0; i < b->obstacles.n; i++) {
+        const mhi_obstacle_draft *other = OBSTACLE(b, i);
+        if (other != first && strcmp(other->obstacle.name, first->obstacle.name) == 0) {
+            mhi_build_warn(b, other->line,
+                           "wrap object '%s' is there twice: paths take the first, in line %d",
+                           other->obstacle.name, (int)first->line);
+        }
+    }
+}
+
 static void check_obstacle(mhi_builder *b, const mhi_obstacle_draft *draft) {
     static const int32_t n_sizes[] = {1, 2, 3, 2};
     static const char *const kinds[] = {"sphere", "cylinder", "ellipsoid", "torus"};
@@ -92,9 +104,14 @@ static void check_wraps(mhi_builder *b, const mhi_path_draft *path) {
         if (obstacle == NULL) {
             return;
         }
+        if (obstacle->unknown != NULL) {
+            mhi_build_unsupported(b, draft->line, "%s '%s' goes straight past the %s '%s'",
+                                  path->what, path->name, obstacle->unknown, draft->obstacle);
+        }
         if (obstacle->active && !obstacle->used) {
             obstacle->used = 1;
             check_obstacle(b, obstacle);
+            warn_of_second(b, obstacle);
         }
         if (wrap->first >= path->points.n || wrap->last >= path->points.n ||
             (wrap->first >= 0 && wrap->last >= 0 && wrap->first >= wrap->last)) {

@@ -2,7 +2,11 @@
 /* osim_function.c: OpenSim's functions of one variable as rows of polynomial pieces. */
 #include "io/osim.h"
 
+#include <math.h>
 #include <string.h>
+
+/* Points that are nearer to each other are one point written twice, with a rounding between. */
+#define X_APART 1e-13
 
 /* The function element of a holder: named "function", within <function>, or the one child that is
  * nothing else. */
@@ -55,11 +59,29 @@ static int32_t read_polynomial(mhi_osim *o, xmlNode *node, const char *whose,
     return 1;
 }
 
+/* A point that stands there twice is moved by what OpenSim takes for the least step of x
+ * (SimmMacros.h, TINY_NUMBER): its spline is then level there, and so is this one. 0: it is no such
+ * point. */
+static int32_t repeated(mhi_osim *o, xmlNode *node, const char *whose, double *x, const double *y,
+                        int32_t i) {
+    const double least = 1e-7;
+    const double at = x[i];
+    if (!(x[i - 1] - at <= least) || y[i] != y[i - 1]) {
+        return 0;
+    }
+    mhi_build_warn(&o->b, mhi_xml_line(node),
+                   "<%s> of %s has the point at %g twice: as in OpenSim it is level there",
+                   (const char *)node->name, whose, at);
+    x[i] = x[i - 1] + least;
+    return 1;
+}
+
 /* x and y of a spline or broken line; 0 after an error. */
 static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const double **x,
                            const double **y, int32_t *n) {
     int32_t n_y;
-    *x = mhi_xml_all_numbers(o, mhi_xml_property(node, "x"), n);
+    double *place = mhi_xml_all_numbers(o, mhi_xml_property(node, "x"), n);
+    *x = place;
     *y = mhi_xml_all_numbers(o, mhi_xml_property(node, "y"), &n_y);
     if (o->b.status != MHE_OK) {
         return 0;
@@ -71,7 +93,8 @@ static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const 
         return 0;
     }
     for (int32_t i = 1; i < *n; i++) {
-        if ((*x)[i] <= (*x)[i - 1]) {
+        if (place[i] - place[i - 1] <= X_APART * fabs(place[i]) &&
+            !repeated(o, node, whose, place, *y, i)) {
             mhi_build_fail(&o->b, mhi_xml_line(node), "<%s> of %s: x does not increase at %g",
                            (const char *)node->name, whose, (*x)[i]);
             return 0;
@@ -97,10 +120,11 @@ static int32_t read_gcv(mhi_osim *o, xmlNode *node, const char *whose, mhe_funct
                               "applied",
                               whose, variance);
     }
-    if (!(half_order >= 1 && half_order <= 4) || n < 2 * (int32_t)half_order) {
+    if (!(half_order >= 1 && half_order <= 4) || half_order != floor(half_order) ||
+        n < 2 * (int32_t)half_order) {
         mhi_build_fail(&o->b, mhi_xml_line(node),
-                       "<GCVSpline> of %s: half_order %g needs to be 1 to 4, and at least twice "
-                       "as many points as that (has %d)",
+                       "<GCVSpline> of %s: half_order %g needs to be 1, 2, 3 or 4, and at least "
+                       "twice as many points as that (has %d)",
                        whose, half_order, (int)n);
         return -1;
     }
@@ -179,6 +203,15 @@ static int32_t read_element(mhi_osim *o, xmlNode *node, const char *whose, mhe_f
     for (size_t i = 0; i < sizeof readers / sizeof *readers; i++) {
         if (mhi_xml_is(node, readers[i].tag)) {
             int32_t found = readers[i].read(o, node, whose, function);
+            for (int32_t k = 0; found == 1 && k < function->n_pieces * function->n_coef; k++) {
+                if (!isfinite(function->coef[k])) {
+                    mhi_build_fail(&o->b, mhi_xml_line(node),
+                                   "<%s> of %s: its slopes are beyond any number: are two x as "
+                                   "good as the same?",
+                                   readers[i].tag, whose);
+                    break;
+                }
+            }
             return o->b.status == MHE_OK ? found : -1;
         }
     }

@@ -2,6 +2,7 @@
 /* osim_path.c: paths of muscles, ligaments and springs: points, wraps, or a polynomial. */
 #include "io/osim.h"
 
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -18,15 +19,25 @@ static void read_conditional(mhi_osim *o, xmlNode *node, const char *whose, mhe_
     const char *coordinate = coordinate_of(o, node, "coordinate");
     double range[2] = {0, 0};
     out->kind = MHE_POINT_CONDITIONAL;
+    if (coordinate == NULL) { /* before 2.0 */
+        coordinate = mhi_xml_word(o, node, "coordinates");
+    }
     if (coordinate == NULL) {
         mhi_build_fail(&o->b, mhi_xml_line(node), "%s has no coordinate", whose);
         return;
     }
     out->coordinate[0] = mhi_osim_coordinate(o, coordinate, mhi_xml_line(node), whose);
-    (void)mhi_xml_range(o, node, "range", range);
+    if (!mhi_xml_range(o, node, "range", range)) {
+        mhi_build_warn(&o->b, mhi_xml_line(node),
+                       "%s has no range: as in OpenSim it is there at 0 alone", whose);
+    }
     if (range[0] > range[1]) {
         mhi_build_fail(&o->b, mhi_xml_line(node), "%s: its range ends (%g) before it begins (%g)",
                        whose, range[1], range[0]);
+    }
+    if (out->coordinate[0] >= 0) {
+        const mhi_coordinate_draft *c = o->b.coordinates.items[out->coordinate[0]];
+        mhi_build_warn_degrees(&o->b, mhi_xml_line(node), whose, &c->coordinate, range);
     }
     out->lower = range[0] - RANGE_MARGIN;
     out->upper = range[1] + RANGE_MARGIN;
@@ -139,6 +150,11 @@ static void read_wrap(mhi_osim *o, xmlNode *node, mhi_path_draft *path) {
                        path->what, path->name, method);
     }
     (void)mhi_xml_numbers(o, node, "range", range, 2); /* points counted from 1; -1: no end */
+    if (range[0] != floor(range[0]) || range[1] != floor(range[1])) {
+        mhi_build_fail(&o->b, draft->line,
+                       "the range of a wrap of %s '%s' is %g %g; it takes numbers of points",
+                       path->what, path->name, range[0], range[1]);
+    }
     draft->wrap.first = range[0] >= 1 && range[0] < INT32_MAX ? (int32_t)range[0] - 1 : -1;
     draft->wrap.last = range[1] >= 1 && range[1] < INT32_MAX ? (int32_t)range[1] - 1 : -1;
 }

@@ -17,6 +17,7 @@
 
 typedef struct mhi_xdf_channel {
     char *label, *unit, *type, *marker; /* "" where the file says nothing */
+    int32_t named; /* a recording of ours: the label was given to it, and has the last word */
 } mhi_xdf_channel;
 
 typedef struct mhi_xdf_stream {

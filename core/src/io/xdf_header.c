@@ -74,7 +74,7 @@ static mhe_status read_channels(mhi_xdf_stream *s, const xmlNode *info, mhe_erro
         }
         mhi_xdf_channel *c = &s->channels[i];
         *c = (mhi_xdf_channel){text_of(node, "label"), text_of(node, "unit"), text_of(node, "type"),
-                               text_of(node, "marker")};
+                               text_of(node, "marker"), number_of(node, "named") == 1};
         if (c->label == NULL || c->unit == NULL || c->type == NULL || c->marker == NULL) {
             return mhi_xdf_no_memory(err);
         }

@@ -16,6 +16,7 @@ static mhe_status ask(mhe_live *l, const mhi_live_request *r, mhe_error *err) {
         l->requests[l->n_requests++] = *r;
     }
     (void)pthread_mutex_unlock(&l->mutex);
+    mhi_mailbox_wake(l->box); /* it is served at once, whatever comes or does not */
     return status;
 }
 
@@ -87,6 +88,10 @@ static void begin_record(mhe_live *l) {
     }
     for (const mhi_packet *p = l->streams; p != NULL && status == MHE_OK; p = p->next) {
         status = mhi_taping_take(l->record, p, &err);
+    }
+    for (int32_t i = 0; i < MHI_FEED_MAXIMA && status == MHE_OK; i++) {
+        status = l->feed.maxima[i] > 0 ? mhi_taping_maximum(l->record, i, l->feed.maxima[i], &err)
+                                       : MHE_OK;
     }
     l->n_recordings += status == MHE_OK;
     if (status != MHE_OK) {

@@ -55,6 +55,27 @@ static void warn(const mhi_feed *f, const char *text) {
     f->setup.host->log(f->setup.host, MHE_LOG_WARNING, text);
 }
 
+/* Maxima that were found stay, whatever becomes of the stream. */
+static void keep_maxima(const mhi_feed *f, mhi_inlet *in) {
+    for (int32_t i = 0; i < f->setup.run->emg.n_channels && i < MHI_FEED_MAXIMA; i++) {
+        if (in->is_raw && in->electrodes != NULL && f->maxima[i] > 0) {
+            (void)mhi_electrodes_set_mvc(in->electrodes, f->setup.run, i, f->maxima[i]);
+        }
+    }
+}
+
+int32_t mhi_feed_set_maximum(mhi_feed *f, int32_t channel, double value) {
+    if (channel < 0 || channel >= f->setup.run->emg.n_channels || channel >= MHI_FEED_MAXIMA ||
+        !(value > 0) || !isfinite(value)) {
+        return 0;
+    }
+    f->maxima[channel] = value;
+    for (int32_t i = 0; i < f->n_inlets; i++) {
+        keep_maxima(f, &f->inlets[i]);
+    }
+    return 1;
+}
+
 /* A stream that is new, or that is another now. Two of one kind: the first is taken. */
 static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
     mhi_inlet *in = mhi_feed_inlet(f, p->source, p->stream);
@@ -92,6 +113,7 @@ static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) 
         mhi_inlet_close(in);
     }
     *in = fresh;
+    keep_maxima(f, in);
     f->clocks[in - f->inlets] = (mhi_feed_clock){.guess = INFINITY, .received = NAN};
     return MHE_OK;
 }
@@ -167,10 +189,10 @@ static void obey(mhi_feed *f, const mhe_grant *grant) {
     }
 }
 
-static void tell_granted(mhi_feed *f, double time) {
+static void tell_granted(mhi_feed *f, double time, mhe_status status) {
     mhe_grant grant;
     mhi_estimator_granted(f->estimator, &grant);
-    grant.prepared = f->prepared;
+    grant.prepared = status == MHE_E_INTERRUPTED ? MHE_GRANT_STOPPED : f->prepared;
     f->prepared = 0;
     if (f->pusher != NULL) {
         f->pusher(f->data, &grant, f->start + time);
@@ -213,7 +235,7 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_
     f->n_frames++;
     obey(f, grant);
     const mhe_status status = mhe_estimator_push(f->estimator, &frame, &estimate, &ready, &why);
-    tell_granted(f, time);
+    tell_granted(f, time, status);
     if (status == MHE_E_ARGUMENT) { /* its time does not follow */
         f->n_out_of_order++;
         return MHE_OK;
@@ -264,8 +286,8 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
     const int32_t is_driver = in == &f->inlets[f->driver];
     const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
     in->newest = smooth;
+    in->n_samples++;
     if (in->is_raw) { /* on the host's time: there may be no frame yet */
-        in->n_samples++;
         mhi_electrodes_push(in->electrodes, smooth, values);
         return MHE_OK;
     }
@@ -276,7 +298,6 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
         f->start = smooth;
     }
     const double time = smooth - f->start;
-    in->n_samples++;
     mhi_inlet_take(in, f->setup.run, values);
     return is_driver ? push_frame(f, in, time, grant, err)
                      : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
@@ -339,10 +360,13 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
     int64_t before = f->n_frames;
     int32_t next = 0; /* grant */
     for (int32_t k = 0; k < p->n && status == MHE_OK; k++) {
+        const mhe_grant *grant = next < p->n_grants ? &p->grants[next] : NULL;
         const double time =
             p->stamp == NULL ? p->received - (p->n - 1 - k) * period : p->stamp[k] + offset;
-        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels,
-                             next < p->n_grants ? &p->grants[next] : NULL, err);
+        if (grant != NULL && grant->prepared == MHE_GRANT_STOPPED) {
+            break; /* nothing came of it and of those after it */
+        }
+        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, grant, err);
         next += f->n_frames > before;
         before = f->n_frames;
     }

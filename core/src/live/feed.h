@@ -9,6 +9,7 @@
 #include "live/inlet.h"
 
 #define MHI_FEED_INLETS 64
+#define MHI_FEED_MAXIMA 64 /* electrodes whose maximum can be looked for */
 
 /* Told of every frame that was estimated. `host_time`: s of CLOCK_MONOTONIC of the estimate's node.
  */
@@ -42,6 +43,7 @@ typedef struct mhi_feed {
     double last;     /* s since then, of the last frame */
     double *waiting; /* ring of frames without the electrodes' EMG */
     int32_t n_waiting, first_waiting;
+    double maxima[MHI_FEED_MAXIMA]; /* of emg.channels, found while it runs; 0: the config's */
     int32_t repeats;         /* what comes is a recording that says what frames were granted */
     int32_t prepared;        /* since the last frame */
     int32_t behind;          /* frames are passed over: the run does not keep up */
@@ -60,6 +62,10 @@ mhe_status mhi_feed_take(mhi_feed *feed, const mhi_packet *packet, mhe_error *er
 /* From now on samples count. MHE_E_INPUT: no stream of markers or joint angles has anything of the
  * model. */
 mhe_status mhi_feed_begin(mhi_feed *feed, mhe_error *err);
+
+/* The EMG of a channel of the config is relative to this maximum from its next sample on. 0: it is
+ * none. */
+int32_t mhi_feed_set_maximum(mhi_feed *feed, int32_t channel, double value);
 
 /* There is time before the next frame: its window is prepared, unless what comes is a repetition,
  * which says itself when. */

@@ -93,6 +93,15 @@ static int32_t without_subject(const mhi_run *run, char *label, size_t room) {
     return own ? 1 : -1;
 }
 
+int32_t mhi_inlet_name(const mhi_run *run, const mhi_stream *about, int32_t i, char *out,
+                       size_t room) {
+    char name[512];
+    without_axis(about->labels[i], about->kind == MHE_STREAM_MARKERS ? 3 : 1, name, sizeof name);
+    const int32_t whose = about->named[i] ? 1 : without_subject(run, name, sizeof name);
+    (void)snprintf(out, room, "%s", about->named[i] ? name : renamed(run, name));
+    return whose;
+}
+
 static mhe_status no_subject(const mhi_inlet_setup *s, const mhi_stream *about, mhe_error *err) {
     const mhi_table came = {.labels = about->labels, .n_labels = about->n_channels};
     const mhi_run *run = s->run;
@@ -117,12 +126,11 @@ static mhe_status make_labels(const mhi_inlet_setup *s, const mhi_stream *about,
     int32_t n_own = 0, n_others = 0;
     for (int32_t i = 0; has_room && i + per_label <= about->n_channels; i += per_label) {
         char name[512], came[512];
-        without_axis(about->labels[i], per_label, name, sizeof name);
         without_axis(about->came[i], per_label, came, sizeof came);
-        const int32_t whose = without_subject(s->run, name, sizeof name);
+        const int32_t whose = mhi_inlet_name(s->run, about, i, name, sizeof name);
         n_own += whose > 0;
         n_others += whose < 0;
-        l->names[l->n] = strdup(renamed(s->run, name));
+        l->names[l->n] = strdup(name);
         l->came[l->n] = strdup(came);
         const int whole = l->names[l->n] != NULL && l->came[l->n] != NULL;
         l->n++;

@@ -25,9 +25,10 @@ typedef struct mhi_inlet {
     int32_t is_raw;             /* EMG of electrodes */
     mhi_electrodes *electrodes; /* where is_raw; its own */
     mhi_stamp stamp;
-    double delay;  /* s, of the source */
-    double newest; /* s of CLOCK_MONOTONIC, its newest sample; -inf: none */
-    int64_t n_samples, n_zero;
+    double delay;      /* s, of the source */
+    double newest;     /* s of CLOCK_MONOTONIC, its newest sample; -inf: none */
+    int64_t n_samples; /* that came while the run ran */
+    int64_t n_zero;
     int32_t lost;             /* the source says that it sends nothing */
     char **missing, **unused; /* labels, for whoever looks; NULL-terminated */
 } mhi_inlet;
@@ -46,6 +47,12 @@ typedef struct mhi_inlet_setup {
 mhe_status mhi_inlet_open(const mhi_inlet_setup *setup, const mhi_stream *about, int32_t source,
                           int32_t stream, double delay, mhi_inlet *inlet, mhe_error *err);
 void mhi_inlet_close(mhi_inlet *inlet);
+
+/* What channel i of a stream is called where its labels are looked for in the model: without its
+ * axis, as data.subject and data.labels have it unless it was given its name while it ran. Returns
+ * 1: the subject's, -1: another's, 0: nobody's. */
+int32_t mhi_inlet_name(const mhi_run *run, const mhi_stream *about, int32_t i, char *out,
+                       size_t room);
 
 /* The sample's values in the order and units of its channel, markers in the model's frame
  * (data.transform), in inlet->row; NaN where there are none. Not of electrodes. [hot] */

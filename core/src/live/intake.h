@@ -15,6 +15,7 @@ typedef struct mhi_stream {
     char *name;
     char **labels, **units; /* [n_channels] */
     char **came;            /* [n_channels] labels as the sender writes them */
+    uint8_t *named;         /* [n_channels] 1: the label has the last word */
 } mhi_stream;
 
 /* What came, in the order in which it came. */
@@ -41,6 +42,8 @@ struct mhi_packet {
     mhi_stream *about; /* of a description */
     int32_t n_grants;
     mhe_grant *grants; /* [n_grants] of the frames that these samples were, in a repetition; NULL */
+    int32_t n_maxima;
+    mhe_maximum *maxima; /* [n_maxima] found before these samples, in a repetition; NULL */
 };
 void mhi_packet_free(mhi_packet *packet);
 mhi_packet *mhi_packet_stream(int32_t source, int32_t stream, const mhe_stream_info *info);

@@ -41,6 +41,7 @@ mhe_status mhi_live_name(const mhe_live *l, mhi_packet *p, mhe_error *err) {
         (void)snprintf(name, room, "%s%s", edit->name, axis);
         free(s->labels[i]);
         s->labels[i] = name;
+        s->named[i] = 1;
     }
     return MHE_OK;
 }
@@ -73,17 +74,19 @@ static mhe_status set(mhe_live *l, const char *came, const char *name, mhe_error
 static mhe_status exchange(mhe_live *l, const mhi_stream *s, const char *came, const char *name,
                            mhe_error *err) {
     char before[128], other[128] = "";
-    const mhi_live_edit *edit = find(l, came, strlen(came));
-    (void)snprintf(before, sizeof before, "%s", edit == NULL ? came : edit->name);
+    (void)snprintf(before, sizeof before, "%s", came);
     for (int32_t i = 0; i < s->n_channels; i++) {
-        const size_t now = base_length(s->labels[i], s->kind),
-                     then = base_length(s->came[i], s->kind);
-        if (is_same(s->labels[i], now, name) && then < sizeof other) {
+        char now[512];
+        const size_t then = base_length(s->came[i], s->kind);
+        (void)mhi_inlet_name(l->run, s, i, now, sizeof now);
+        if (is_same(s->came[i], then, came)) {
+            (void)snprintf(before, sizeof before, "%.127s", now);
+        } else if (strcmp(now, name) == 0 && then < sizeof other) {
             (void)snprintf(other, sizeof other, "%.*s", (int)then, s->came[i]);
         }
     }
     mhe_status status = set(l, came, name, err);
-    if (status == MHE_OK && other[0] != '\0' && strcmp(other, came) != 0) {
+    if (status == MHE_OK && other[0] != '\0') {
         status = set(l, other, before, err);
     }
     return status;
@@ -116,7 +119,8 @@ mhe_status mhi_live_relabel(mhe_live *l, const char *text, mhe_error *err) {
                                       .units = (const char *const *)s->units,
                                       .rate = s->rate,
                                       .up = s->up,
-                                      .delay = s->delay};
+                                      .delay = s->delay,
+                                      .named = s->named};
         mhi_packet *p = mhi_packet_stream(of->source, of->stream, &info);
         status =
             p == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : mhi_live_take(l, p, err);

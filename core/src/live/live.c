@@ -40,8 +40,7 @@ static mhe_status start_sources(mhe_live *l, mhe_error *err) {
                         l->run->path);
     }
     l->intakes = calloc((size_t)list->n, sizeof(mhi_intake *));
-    l->box = mhi_mailbox_create(l->run->realtime.priority > 0);
-    if (l->intakes == NULL || l->box == NULL) {
+    if (l->intakes == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     mhe_status status = MHE_OK;
@@ -116,7 +115,9 @@ mhe_status mhe_live_open(mhe_config *config, const mhe_live_setup *setup, mhe_li
     l->wait = setup->wait;
     l->mvc_channel = -1;
     mhi_priority_mutex(&l->mutex, l->run->realtime.priority > 0);
-    mhe_status status = open_estimator(l, err);
+    l->box = mhi_mailbox_create(l->run->realtime.priority > 0); /* sinks' requests wake it */
+    mhe_status status =
+        l->box == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : open_estimator(l, err);
     if (status == MHE_OK) {
         mhi_live_set_control(l);
         const mhi_outlets_setup sinks = {&l->own_host,  l->run,    l->model,
@@ -226,6 +227,9 @@ mhe_status mhi_live_take(mhe_live *l, mhi_packet *p, mhe_error *err) {
     if (p->kind == MHI_PACKET_STREAM && mhi_live_name(l, p, err) != MHE_OK) {
         mhi_packet_free(p);
         return MHE_E_MEMORY;
+    }
+    for (int32_t k = 0; k < p->n_maxima && l->feed.running; k++) {
+        mhi_live_take_mvc(l, p->maxima[k].channel, p->maxima[k].value);
     }
     if (l->feed.running || p->kind == MHI_PACKET_STREAM) {
         record_packet(l, p);

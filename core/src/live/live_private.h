@@ -15,7 +15,6 @@
 
 #define MHI_LIVE_STATE 61440 /* bytes */
 #define MHI_LIVE_REQUESTS 16
-#define MHI_LIVE_MVC 64    /* electrodes whose maximum can be looked for */
 #define MHI_LIVE_EDITS 256 /* labels that can be given other names */
 
 typedef struct mhi_live_request {
@@ -47,11 +46,10 @@ struct mhe_live {
     mhe_status record_status;
     mhe_error record_why;
     int32_t n_recordings;
-    int32_t work;             /* a frame was estimated and the next is not prepared yet */
-    double newest;            /* s of CLOCK_MONOTONIC, node of the last estimate */
-    int32_t mvc_channel;      /* -1: none is looked for */
-    double mvc_began;         /* s */
-    double mvc[MHI_LIVE_MVC]; /* maxima found; 0: not yet */
+    int32_t work;        /* a frame was estimated and the next is not prepared yet */
+    double newest;       /* s of CLOCK_MONOTONIC, node of the last estimate */
+    int32_t mvc_channel; /* -1: none is looked for */
+    double mvc_began;    /* s */
     char mvc_file[512];
     int32_t n_edits;
     mhi_live_edit *edits;  /* [MHI_LIVE_EDITS] */
@@ -88,5 +86,7 @@ mhe_status mhi_live_name(const mhe_live *live, mhi_packet *stream, mhe_error *er
 mhi_inlet *mhi_live_electrodes(mhe_live *live); /* the stream of electrodes; NULL: none */
 void mhi_live_begin_mvc(mhe_live *live, const char *name);
 void mhi_live_end_mvc(mhe_live *live);
+/* The run takes a maximum from the next packet on, and its recording says so. */
+void mhi_live_take_mvc(mhe_live *live, int32_t channel, double value);
 
 #endif

@@ -7,6 +7,7 @@
 
 #include <math.h>
 #include <pthread.h>
+#include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -28,6 +29,7 @@ static void free_stream(mhi_stream *s) {
         free(s->labels);
         free(s->units);
         free(s->came);
+        free(s->named);
         free(s->name);
         free(s);
     }
@@ -39,6 +41,7 @@ void mhi_packet_free(mhi_packet *p) {
         free(p->stamp);
         free(p->values);
         free(p->grants);
+        free(p->maxima);
         free(p->text);
         free(p);
     }
@@ -77,8 +80,11 @@ mhi_packet *mhi_packet_stream(int32_t source, int32_t stream, const mhe_stream_i
     s->labels = calloc((size_t)info->n_channels + 1, sizeof *s->labels);
     s->units = calloc((size_t)info->n_channels + 1, sizeof *s->units);
     s->came = calloc((size_t)info->n_channels + 1, sizeof *s->came);
-    int whole = s->name != NULL && s->labels != NULL && s->units != NULL && s->came != NULL;
+    s->named = calloc((size_t)info->n_channels + 1, 1);
+    int whole = s->name != NULL && s->labels != NULL && s->units != NULL && s->came != NULL &&
+                s->named != NULL;
     for (int32_t i = 0; i < info->n_channels && whole; i++) {
+        s->named[i] = info->named != NULL && info->named[i];
         s->labels[i] = copy(info->labels[i]);
         s->units[i] = copy(info->units == NULL ? NULL : info->units[i]);
         s->came[i] = copy(info->labels[i]);
@@ -91,15 +97,31 @@ mhi_packet *mhi_packet_stream(int32_t source, int32_t stream, const mhe_stream_i
     return p;
 }
 
-static int copy_grants(mhi_packet *p, const mhe_chunk *chunk) {
-    p->grants = calloc((size_t)chunk->n_grants + 1, sizeof *p->grants);
-    for (int32_t i = 0; i < chunk->n_grants && p->grants != NULL; i++) {
-        const char *at = (const char *)chunk->grants + (size_t)i * chunk->grant_size;
-        memcpy(&p->grants[i], at,
-               chunk->grant_size < sizeof *p->grants ? chunk->grant_size : sizeof *p->grants);
+/* n structs of a source's size as such of ours; NULL: no memory. */
+static void *copy_structs(const void *from, int32_t n, size_t stride, size_t size) {
+    char *to = calloc((size_t)n + 1, size);
+    for (int32_t i = 0; i < n && to != NULL; i++) {
+        memcpy(to + (size_t)i * size, (const char *)from + (size_t)i * stride,
+               stride < size ? stride : size);
     }
-    p->n_grants = p->grants == NULL ? 0 : chunk->n_grants;
-    return p->grants != NULL;
+    return to;
+}
+
+#define CHUNK_HAS(chunk, field) \
+    ((chunk)->size >= offsetof(mhe_chunk, field) + sizeof(chunk)->field && (chunk)->field != NULL)
+
+/* What a repetition says of the samples. 0: no memory. */
+static int copy_recorded(mhi_packet *p, const mhe_chunk *c) {
+    if (CHUNK_HAS(c, grants)) {
+        p->grants = copy_structs(c->grants, c->n_grants, c->grant_size, sizeof *p->grants);
+        p->n_grants = p->grants == NULL ? 0 : c->n_grants;
+    }
+    if (CHUNK_HAS(c, maxima)) {
+        p->maxima = copy_structs(c->maxima, c->n_maxima, c->maximum_size, sizeof *p->maxima);
+        p->n_maxima = p->maxima == NULL ? 0 : c->n_maxima;
+    }
+    return (!CHUNK_HAS(c, grants) || p->grants != NULL) &&
+           (!CHUNK_HAS(c, maxima) || p->maxima != NULL);
 }
 
 mhi_packet *mhi_packet_samples(int32_t source, int32_t n_channels, const mhe_chunk *chunk) {
@@ -121,7 +143,7 @@ mhi_packet *mhi_packet_samples(int32_t source, int32_t n_channels, const mhe_chu
         memcpy(p->stamp, chunk->stamp, sizeof(double) * n);
     }
     memcpy(p->values, chunk->values, sizeof(double) * numbers);
-    if (chunk->size >= sizeof *chunk && chunk->grants != NULL && !copy_grants(p, chunk)) {
+    if (!copy_recorded(p, chunk)) {
         mhi_packet_free(p);
         return NULL;
     }

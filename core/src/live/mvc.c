@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* mvc.c: maximal voluntary contractions: the largest envelope of an electrode while it is asked
- * for. */
+ * for. The run takes it at once. */
 #include "base/clock.h"
 #include "base/text.h"
 #include "live/live_private.h"
@@ -23,7 +23,7 @@ void mhi_live_begin_mvc(mhe_live *l, const char *name) {
     mhi_inlet *in = mhi_live_electrodes(l);
     double before = 0;
     l->mvc_channel = -1;
-    for (int32_t i = 0; in != NULL && i < l->run->emg.n_channels && i < MHI_LIVE_MVC; i++) {
+    for (int32_t i = 0; in != NULL && i < l->run->emg.n_channels && i < MHI_FEED_MAXIMA; i++) {
         if (strcmp(l->run->emg.channels[i].name, name) == 0 &&
             mhi_electrodes_peak(in->electrodes, i, 1, &before)) {
             l->mvc_channel = i;
@@ -39,10 +39,10 @@ static void write_mvc(mhe_live *l) {
     mhi_text_add(&text,
                  "# Envelopes at maximal contraction, in the channels' units: write them into "
                  "emg.channels as mvc.\n");
-    for (int32_t i = 0; i < l->run->emg.n_channels && i < MHI_LIVE_MVC; i++) {
-        if (l->mvc[i] > 0) {
+    for (int32_t i = 0; i < l->run->emg.n_channels && i < MHI_FEED_MAXIMA; i++) {
+        if (l->feed.maxima[i] > 0) {
             mhi_text_add(&text, "- {name: \"%s\", mvc: %.6g}\n", l->run->emg.channels[i].name,
-                         l->mvc[i]);
+                         l->feed.maxima[i]);
         }
     }
     (void)snprintf(path, sizeof path, "%.1000s/mvc.yaml", l->folder);
@@ -62,12 +62,27 @@ static void write_mvc(mhe_live *l) {
     mhi_text_free(&text);
 }
 
+void mhi_live_take_mvc(mhe_live *l, int32_t channel, double value) {
+    char line[256];
+    mhe_error err = {0};
+    if (!mhi_feed_set_maximum(&l->feed, channel, value)) {
+        return;
+    }
+    (void)snprintf(line, sizeof line,
+                   "electrode '%.100s': its EMG is relative to %.6g from here on",
+                   l->run->emg.channels[channel].name, value);
+    l->host->log(l->host, MHE_LOG_INFO, line);
+    if (l->record != NULL && mhi_taping_maximum(l->record, channel, value, &err) != MHE_OK) {
+        mhi_live_end_record(l, err.text);
+    }
+}
+
 void mhi_live_end_mvc(mhe_live *l) {
     mhi_inlet *in = mhi_live_electrodes(l);
     double peak = 0;
     if (l->mvc_channel >= 0 && in != NULL &&
         mhi_electrodes_peak(in->electrodes, l->mvc_channel, 0, &peak) && peak > 0) {
-        l->mvc[l->mvc_channel] = peak;
+        mhi_live_take_mvc(l, l->mvc_channel, peak);
         write_mvc(l);
     }
     l->mvc_channel = -1;

@@ -18,7 +18,9 @@ typedef struct owned {
     mhe_recorded_stream *streams;
     mhe_arrival *arrivals;
     mhe_grant *grants;
-    char ***labels; /* [n_streams][channels], its own */
+    mhe_maximum *maxima;
+    uint8_t **named; /* [n_streams][channels] */
+    char ***labels;  /* [n_streams][channels], its own */
     const char ***units;
     int32_t *n_labels;
 } owned;
@@ -34,13 +36,16 @@ static void recorded_free(const mhe_recorded *recorded) {
         }
         free(o->labels == NULL ? NULL : o->labels[i]);
         free(o->units == NULL ? NULL : (void *)o->units[i]);
+        free(o->named == NULL ? NULL : o->named[i]);
     }
     free(o->labels);
     free((void *)o->units);
+    free(o->named);
     free(o->n_labels);
     free(o->streams);
     free(o->arrivals);
     free(o->grants);
+    free(o->maxima);
     mhi_table_free(o->table);
     mhi_xdf_free(o->xdf);
     free(o);
@@ -55,7 +60,9 @@ static mhe_status take_room(owned *o, int32_t n, mhe_error *err) {
     o->labels = calloc((size_t)n + 1, sizeof *o->labels);
     o->units = calloc((size_t)n + 1, sizeof *o->units);
     o->n_labels = calloc((size_t)n + 1, sizeof *o->n_labels);
-    return o->streams == NULL || o->labels == NULL || o->units == NULL || o->n_labels == NULL
+    o->named = calloc((size_t)n + 1, sizeof *o->named);
+    return o->streams == NULL || o->labels == NULL || o->units == NULL || o->n_labels == NULL ||
+                   o->named == NULL
                ? no_memory(err)
                : MHE_OK;
 }
@@ -65,8 +72,10 @@ static mhe_status begin_stream(owned *o, int32_t n, mhe_error *err) {
     const int32_t i = o->face.n_streams++;
     o->labels[i] = calloc((size_t)n + 1, sizeof *o->labels[i]);
     o->units[i] = calloc((size_t)n + 1, sizeof *o->units[i]);
+    o->named[i] = calloc((size_t)n + 1, 1);
     o->n_labels[i] = n;
-    return o->labels[i] == NULL || o->units[i] == NULL ? no_memory(err) : MHE_OK;
+    return o->labels[i] == NULL || o->units[i] == NULL || o->named[i] == NULL ? no_memory(err)
+                                                                              : MHE_OK;
 }
 
 /* ---- .trc, .sto ... ---- */
@@ -123,6 +132,7 @@ static mhe_status add_xdf_stream(owned *o, const mhi_xdf_stream *s, int as_it_ca
     for (int32_t k = 0; k < s->n_channels && status == MHE_OK; k++) {
         o->labels[i][k] = strdup(s->channels[k].label);
         o->units[i][k] = s->channels[k].unit;
+        o->named[i][k] = s->channels[k].named != 0;
         status = o->labels[i][k] == NULL ? no_memory(err) : MHE_OK;
     }
     if (status == MHE_OK) {
@@ -133,7 +143,8 @@ static mhe_status add_xdf_stream(owned *o, const mhi_xdf_stream *s, int as_it_ca
                                                         .labels = (const char *const *)o->labels[i],
                                                         .units = o->units[i],
                                                         .rate = s->rate,
-                                                        .up = -1},
+                                                        .up = -1,
+                                                        .named = o->named[i]},
                                               .replaces = -1,
                                               .n = s->n_samples,
                                               .stamp = as_it_came ? s->stamp : s->time,
@@ -177,7 +188,7 @@ static mhe_status take_grants(owned *o, mhe_error *err) {
         }
         last = (int64_t)row[0];
         *g = (mhe_grant){last,
-                         whole(row[1], 0, MHE_GRANT_PASSED_OVER),
+                         whole(row[1], 0, MHE_GRANT_STOPPED),
                          row[2] != 0,
                          whole(row[3], -1, INT32_MAX),
                          {0}};
@@ -187,6 +198,31 @@ static mhe_status take_grants(owned *o, mhe_error *err) {
     }
     o->face.grants = o->grants;
     o->face.n_grants = s->n_samples;
+    return MHE_OK;
+}
+
+/* Maxima of electrodes that were found meanwhile. */
+static mhe_status take_maxima(owned *o, mhe_error *err) {
+    const mhi_xdf_stream *s = find_ours(o->xdf, MHI_MAXIMA, MHI_MAXIMUM_COLUMNS);
+    if (s == NULL) {
+        return MHE_OK;
+    }
+    o->maxima = calloc((size_t)s->n_samples + 1, sizeof *o->maxima);
+    if (o->maxima == NULL) {
+        return no_memory(err);
+    }
+    double last = 0;
+    for (int64_t k = 0; k < s->n_samples; k++) {
+        const double *row = s->values + k * MHI_MAXIMUM_COLUMNS;
+        if (!(row[0] >= last && row[0] <= (double)o->face.n_arrivals) || !(row[2] > 0)) {
+            return mhe_fail(err, MHE_E_INPUT, "%s: maximum %lld is none, or of no packet",
+                            o->xdf->path, (long long)k);
+        }
+        last = row[0];
+        o->maxima[k] = (mhe_maximum){(int64_t)row[0], row[2], whole(row[1], -1, INT32_MAX)};
+    }
+    o->face.maxima = o->maxima;
+    o->face.n_maxima = s->n_samples;
     return MHE_OK;
 }
 
@@ -257,6 +293,7 @@ static mhe_status from_xdf(owned *o, mhe_error *err) {
     if (status == MHE_OK && arrivals != NULL) {
         status = take_arrivals(o, arrivals, number, most, err);
         status = status == MHE_OK ? take_grants(o, err) : status;
+        status = status == MHE_OK ? take_maxima(o, err) : status;
         take_descriptions(o, number, most);
     }
     free(number);
@@ -275,6 +312,7 @@ static mhe_status recorded_read(const char *path, int32_t kind, const mhe_record
     o->face.stream_size = sizeof *o->streams;
     o->face.arrival_size = sizeof *o->arrivals;
     o->face.grant_size = sizeof *o->grants;
+    o->face.maximum_size = sizeof *o->maxima;
     mhe_status status;
     if (dot != NULL && strcasecmp(dot, ".xdf") == 0) {
         status = mhi_xdf_read(path, &o->xdf, err);

@@ -21,6 +21,11 @@
 #define MHI_DESCRIPTIONS "mhe-descriptions"
 #define MHI_DESCRIPTION_COLUMNS 5
 
+/* A row a maximum of an electrode that the run took: arrivals before it, number in emg.channels,
+ * the maximum. */
+#define MHI_MAXIMA "mhe-maxima"
+#define MHI_MAXIMUM_COLUMNS 3
+
 extern const mhe_recorded_service mhi_recorded_service;
 
 #endif

@@ -40,12 +40,12 @@ static void add_streams(const mhe_live *l, cJSON *root) {
 static void add_electrodes(mhe_live *l, cJSON *root) {
     cJSON *list = cJSON_AddArrayToObject(root, "electrodes");
     mhi_inlet *in = mhi_live_electrodes(l);
-    for (int32_t i = 0; in != NULL && i < l->run->emg.n_channels && i < MHI_LIVE_MVC; i++) {
+    for (int32_t i = 0; in != NULL && i < l->run->emg.n_channels && i < MHI_FEED_MAXIMA; i++) {
         cJSON *e = cJSON_CreateObject();
         cJSON_AddItemToArray(list, e);
         cJSON_AddStringToObject(e, "name", l->run->emg.channels[i].name);
-        if (l->mvc[i] > 0) {
-            cJSON_AddNumberToObject(e, "max", l->mvc[i]);
+        if (l->feed.maxima[i] > 0) {
+            cJSON_AddNumberToObject(e, "max", l->feed.maxima[i]);
         }
     }
     double peak = 0;

@@ -18,7 +18,7 @@ typedef struct entry {
 struct mhi_taping {
     mhi_xdf_writer *writer;
     char *path;
-    uint32_t arrivals, frames, grants, descriptions;
+    uint32_t arrivals, frames, grants, descriptions, maxima;
     int64_t n_arrivals;
     int32_t n_entries;
     entry entries[2 * MHI_FEED_INLETS];
@@ -27,25 +27,33 @@ struct mhi_taping {
     double last; /* s, of the packet taken last */
 };
 
-static const mhi_xdf_column arrival_columns[MHI_ARRIVAL_COLUMNS] = {{"stream", "1", NULL, NULL},
-                                                                    {"samples", "1", NULL, NULL},
-                                                                    {"received", "s", NULL, NULL},
-                                                                    {"offset", "s", NULL, NULL},
-                                                                    {"stamped", "1", NULL, NULL}};
+static const mhi_xdf_column arrival_columns[MHI_ARRIVAL_COLUMNS] = {
+    {.label = "stream", .unit = "1"},
+    {.label = "samples", .unit = "1"},
+    {.label = "received", .unit = "s"},
+    {.label = "offset", .unit = "s"},
+    {.label = "stamped", .unit = "1"}};
 static const mhi_xdf_column frame_columns[MHI_FRAME_COLUMNS] = {
-    {"time", "s", NULL, NULL}, {"status", "1", NULL, NULL}, {"iterations", "1", NULL, NULL}};
+    {.label = "time", .unit = "s"},
+    {.label = "status", .unit = "1"},
+    {.label = "iterations", .unit = "1"}};
 
 static const mhi_xdf_column grant_columns[MHI_GRANT_COLUMNS] = {
-    {"arrival", "1", NULL, NULL},   {"prepared", "1", NULL, NULL},  {"by_clock", "1", NULL, NULL},
-    {"refused", "1", NULL, NULL},   {"in_time", "1", NULL, NULL},   {"late", "1", NULL, NULL},
-    {"in_time_2", "1", NULL, NULL}, {"late_2", "1", NULL, NULL},    {"in_time_3", "1", NULL, NULL},
-    {"late_3", "1", NULL, NULL},    {"in_time_4", "1", NULL, NULL}, {"late_4", "1", NULL, NULL}};
+    {.label = "arrival", .unit = "1"},   {.label = "prepared", .unit = "1"},
+    {.label = "by_clock", .unit = "1"},  {.label = "refused", .unit = "1"},
+    {.label = "in_time", .unit = "1"},   {.label = "late", .unit = "1"},
+    {.label = "in_time_2", .unit = "1"}, {.label = "late_2", .unit = "1"},
+    {.label = "in_time_3", .unit = "1"}, {.label = "late_3", .unit = "1"},
+    {.label = "in_time_4", .unit = "1"}, {.label = "late_4", .unit = "1"}};
 static const mhi_xdf_column description_columns[MHI_DESCRIPTION_COLUMNS] = {
-    {"id", "1", NULL, NULL},
-    {"source", "1", NULL, NULL},
-    {"stream", "1", NULL, NULL},
-    {"arrivals", "1", NULL, NULL},
-    {"delay", "s", NULL, NULL}};
+    {.label = "id", .unit = "1"},
+    {.label = "source", .unit = "1"},
+    {.label = "stream", .unit = "1"},
+    {.label = "arrivals", .unit = "1"},
+    {.label = "delay", .unit = "s"}};
+
+static const mhi_xdf_column maximum_columns[MHI_MAXIMUM_COLUMNS] = {
+    {.label = "arrivals", .unit = "1"}, {.label = "channel", .unit = "1"}, {.label = "maximum"}};
 
 static mhe_status add_our_streams(mhi_taping *r, const char *title, mhe_error *err) {
     const struct {
@@ -56,7 +64,8 @@ static mhe_status add_our_streams(mhi_taping *r, const char *title, mhe_error *e
     } ours[] = {{MHI_ARRIVALS, arrival_columns, MHI_ARRIVAL_COLUMNS, &r->arrivals},
                 {MHI_FRAMES, frame_columns, MHI_FRAME_COLUMNS, &r->frames},
                 {MHI_GRANTS, grant_columns, MHI_GRANT_COLUMNS, &r->grants},
-                {MHI_DESCRIPTIONS, description_columns, MHI_DESCRIPTION_COLUMNS, &r->descriptions}};
+                {MHI_DESCRIPTIONS, description_columns, MHI_DESCRIPTION_COLUMNS, &r->descriptions},
+                {MHI_MAXIMA, maximum_columns, MHI_MAXIMUM_COLUMNS, &r->maxima}};
     mhe_status status = MHE_OK;
     for (size_t i = 0; i < sizeof ours / sizeof *ours && status == MHE_OK; i++) {
         status = mhi_xdf_add_stream(r->writer, title, ours[i].type, 0, ours[i].columns, ours[i].n,
@@ -109,6 +118,7 @@ static mhe_status add_stream(mhi_taping *r, const mhi_packet *p, mhe_error *err)
     for (int32_t i = 0; i < s->n_channels; i++) {
         columns[i].label = s->labels[i];
         columns[i].unit = s->units[i];
+        columns[i].named = s->named[i] ? "1" : NULL;
         columns[i].type = s->kind == MHE_STREAM_MARKERS ? axes[i % 3] : NULL;
     }
     entry *e = &r->entries[r->n_entries++];
@@ -178,6 +188,11 @@ mhe_status mhi_taping_grant(mhi_taping *r, const mhe_grant *grant, double host_t
         row[4 + i] = grant->looks[i];
     }
     return mhi_xdf_put(r->writer, r->grants, MHI_GRANT_COLUMNS, 1, &host_time, row, err);
+}
+
+mhe_status mhi_taping_maximum(mhi_taping *r, int32_t channel, double value, mhe_error *err) {
+    const double row[MHI_MAXIMUM_COLUMNS] = {(double)r->n_arrivals, channel, value};
+    return mhi_xdf_put(r->writer, r->maxima, MHI_MAXIMUM_COLUMNS, 1, &r->last, row, err);
 }
 
 const char *mhi_taping_path(const mhi_taping *r) {

@@ -19,6 +19,8 @@ mhe_status mhi_taping_frame(mhi_taping *record, const mhe_estimate *estimate, do
 /* What the frame of the packet taken last was granted. [cold] */
 mhe_status mhi_taping_grant(mhi_taping *record, const mhe_grant *grant, double host_time,
                             mhe_error *err);
+/* A maximum of a channel of the config that is taken from the next packet on. [cold] */
+mhe_status mhi_taping_maximum(mhi_taping *record, int32_t channel, double value, mhe_error *err);
 mhe_status mhi_taping_close(mhi_taping *record, mhe_error *err); /* NULL is fine. [cold] */
 const char *mhi_taping_path(const mhi_taping *record);
 

@@ -169,6 +169,7 @@ mhe_status mhi_xdf_add_stream(mhi_xdf_writer *w, const char *name, const char *t
         put_element(w, "unit", columns[i].unit);
         put_element(w, "type", columns[i].type);
         put_element(w, "marker", columns[i].marker);
+        put_element(w, "named", columns[i].named);
         put_text(w, "</channel>");
     }
     put_text(w, "</channels></desc></info>");

@@ -10,6 +10,7 @@ typedef struct mhi_xdf_writer mhi_xdf_writer;
 
 typedef struct mhi_xdf_column {
     const char *label, *unit, *type, *marker; /* NULL: not said */
+    const char *named;                        /* "1": the label is of the model; NULL */
 } mhi_xdf_column;
 
 /* Begins a file that must not exist yet. MHE_E_IO. [cold] */

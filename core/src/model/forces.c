@@ -74,7 +74,9 @@ static mhe_status create_one(mhi_system *s, const mhi_force_setup *setup, mhi_fo
     if (status == MHE_OK) {
         status = check_layout(f, s, err);
     }
-    f->name = f->layout.name != NULL ? f->layout.name : f->plugin->id;
+    f->name = setup->name != NULL      ? setup->name
+              : f->layout.name != NULL ? f->layout.name
+                                       : f->plugin->id;
     for (int32_t i = 0; i < s->n_forces && status == MHE_OK && f->layout.n_inputs > 0; i++) {
         if (s->forces[i].layout.n_inputs > 0 && strcmp(s->forces[i].name, f->name) == 0) {
             return mhe_fail(err, MHE_E_CONFIG, "%s: a force before it has inputs named '%s' too",
@@ -145,6 +147,27 @@ mhe_status mhi_system_inputs(const mhi_system *s, double t, double *w, mhe_error
         }
     }
     return status;
+}
+
+void mhi_system_inputs_of(const mhi_system *s, int32_t position, int32_t *first, int32_t *n) {
+    *first = *n = 0;
+    for (int32_t i = 0; i < s->n_forces; i++) {
+        if (s->forces[i].position == position) {
+            *first = s->forces[i].first_input;
+            *n = s->forces[i].layout.n_inputs;
+        }
+    }
+}
+
+mhe_status mhi_system_known(const mhi_system *s, int32_t position, double *first, double *last,
+                            mhe_error *err) {
+    for (int32_t i = 0; i < s->n_forces; i++) {
+        const mhi_force *f = &s->forces[i];
+        if (f->position == position && f->layout.n_inputs > 0 && f->ops->input != NULL) {
+            return f->ops->covers(f->self, first, last, err);
+        }
+    }
+    return MHE_OK;
 }
 
 int32_t mhi_system_input_is_measured(const mhi_system *s, const char *name) {

@@ -31,6 +31,7 @@ typedef struct mhi_bounds {
 typedef struct mhi_force_setup {
     const mhe_plugin *plugin;
     const void *config;
+    const char *name; /* of its inputs; NULL: as the plugin calls them */
 } mhi_force_setup;
 
 /* Plugins with their filled configs; formulation is MHE_FORMULATION_*. All but `bounds` lent for
@@ -74,6 +75,12 @@ const double *mhi_system_activation(const mhi_system *system, const double *x, c
 /* Inputs of the forces that have them in a file, at time t (s); the others' entries of w [n_w] are
  * left alone. [hot] */
 mhe_status mhi_system_inputs(const mhi_system *system, double t, double *w, mhe_error *err);
+/* From when to when (s) the inputs of force `position` of the setup are known; as they are where it
+ * has none, or none from a file. */
+mhe_status mhi_system_known(const mhi_system *system, int32_t position, double *first, double *last,
+                            mhe_error *err);
+/* Which entries of w [n_w] are the inputs of force `position` of the setup; n 0: it has none. */
+void mhi_system_inputs_of(const mhi_system *system, int32_t position, int32_t *first, int32_t *n);
 /* Whether the input block `name` comes with the frames, not from a file. */
 int32_t mhi_system_input_is_measured(const mhi_system *system, const char *name);
 /* MHE_E_INPUT: the inputs of a force are not known from `first` to `last` (s): its file is shorter,

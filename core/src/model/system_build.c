@@ -111,10 +111,20 @@ static mhe_status find_ranges(mhi_system *s, mhe_error *err) {
     return status;
 }
 
+/* What a plugin says of the model's numbers it says without the file's name. */
+static mhe_status at_source(mhe_status status, const mhe_description *d, mhe_error *err) {
+    if (status == MHE_E_INPUT && err != NULL && d->source != NULL) {
+        const mhe_error why = *err;
+        return mhe_fail(err, status, "%s: %.600s", d->source, why.text);
+    }
+    return status;
+}
+
 static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe_error *err) {
     const mhe_description *d = setup->description;
-    mhe_status status =
-        mhi_model_create(setup->model, setup->host, d, setup->model_config, &s->model_self, err);
+    mhe_status status = at_source(
+        mhi_model_create(setup->model, setup->host, d, setup->model_config, &s->model_self, err), d,
+        err);
     if (status == MHE_OK) {
         status = find_ranges(s, err);
     }
@@ -126,8 +136,10 @@ static mhe_status create_parts(mhi_system *s, const mhi_system_setup *setup, mhe
     }
     if (status == MHE_OK) {
         memcpy(s->muscles, d->muscles, sizeof *s->muscles * (size_t)d->n_muscles);
-        status = mhi_muscle_create(setup->muscle, setup->host, s->muscles, d->n_muscles,
-                                   setup->muscle_config, &s->muscle_self, &s->muscle_layout, err);
+        status = at_source(mhi_muscle_create(setup->muscle, setup->host, s->muscles, d->n_muscles,
+                                             setup->muscle_config, &s->muscle_self,
+                                             &s->muscle_layout, err),
+                           d, err);
     }
     if (status == MHE_OK) {
         status = check_muscle_layout(s, setup->muscle->id, err);

@@ -66,6 +66,66 @@ static void force_derivatives(void **state) {
     assert_true(worst < 1e-6);
 }
 
+typedef struct numbered {
+    const char *set;
+    mhe_muscle muscle;
+    double a, l, w;
+} numbered;
+
+/* y = F at x = (F_max in kN, l_opt, l_slack): a muscle made anew. */
+static int force_of_numbers(void *data, const double *x, double *y) {
+    const numbered *at = data;
+    mhe_muscle m = at->muscle;
+    m.max_isometric_force = 1000 * x[0];
+    m.optimal_fiber_length = x[1];
+    m.tendon_slack_length = x[2];
+    struct test_hill hill = test_hill(&m, 1, at->set);
+    assert_non_null(hill.ops);
+    *y = force_at(&hill, at->a, at->l, at->w);
+    hill.ops->destroy(hill.self);
+    return 0;
+}
+
+/* By the numbers that a calibration estimates. */
+static void derivatives_by_numbers(void **state) {
+    (void)state;
+    uint64_t seed = 19;
+    double worst = 0, ramped = 0;
+    for (size_t set = 0; set < sizeof sets / sizeof sets[0]; set++) {
+        for (int32_t type = 0; type < N_TYPES; type++) {
+            for (int trial = 0; trial < 40; trial++) {
+                const double l_opt = test_random(&seed, 0.05, 0.2),
+                             ls = test_random(&seed, 0.02, 0.2);
+                numbered at = {sets[set],
+                               test_muscle(types[type], 500, l_opt, ls,
+                                           trial % 4 == 0 ? NAN : test_random(&seed, 0, 0.6)),
+                               test_random(&seed, 0.02, 1),
+                               ls + l_opt * test_random(&seed, 0.4, 1.5),
+                               test_random(&seed, -0.9, 0.9)};
+                double jacobian[3];
+                struct test_hill hill = test_hill(&at.muscle, 1, at.set);
+                mhe_muscle_layout layout = {.size = sizeof layout};
+                assert_non_null(hill.ops);
+                assert_int_equal(hill.ops->layout(hill.self, &layout, NULL), MHE_OK);
+                assert_int_equal(layout.n_parameters, 3);
+                const mhe_muscle_values out = {.size = sizeof out, .force_p = jacobian};
+                assert_int_equal(test_hill_at(&hill, &at.a, &at.l, &at.w, &out, NULL), MHE_OK);
+                jacobian[0] *= 1000;
+                const double x[3] = {0.5, l_opt, ls};
+                const double error = test_jacobian_error(force_of_numbers, &at, x, 3, 1, jacobian);
+                assert_true(error >= 0);
+                worst = fmax(worst, error);
+                const double n = (at.l - ls) / l_opt / cos(fmax(0, at.muscle.pennation_angle));
+                ramped += set == 4 && n < ls / l_opt && n > ls / l_opt - 0.3;
+                hill.ops->destroy(hill.self);
+            }
+        }
+    }
+    print_message("by strengths and lengths: %.1e of the largest\n", worst);
+    assert_true(worst < 1e-6);
+    assert_true(ramped > 20); /* where the ramp moves with both lengths */
+}
+
 /* What the headers of the curves and docs/outputs.md say of negative forces: up to the largest
  * shortening speed no set pushes by itself; the damping of `paper2021` does, by as much as it is.
  */
@@ -93,6 +153,34 @@ static void pushes_only_by_its_damping(void **state) {
         }
     }
     assert_true(pushing > 0); /* an idle muscle of paper2021 */
+}
+
+/* OpenSim's active_force_width_scale w and ignore_passive_fiber_force: with full activation at rest
+ * the force is that of the plain curve at 1 + (n - 1) / w, its passive part taken off. */
+static void active_curve_as_wide_as_the_file_says(void **state) {
+    (void)state;
+    const double l_opt = 0.1, slack = 0.2, width = 1.5;
+    mhe_muscle m = test_muscle(MHE_MUSCLE_DEGROOTE2016, 1000, l_opt, slack, 0);
+    m.passive_strain = INFINITY;
+    struct test_hill plain = test_hill(&m, 1, "curves: degroote2016");
+    m.active_shape = width;
+    struct test_hill wide = test_hill(&m, 1, "curves: degroote2016");
+    assert_true(plain.ops != NULL && wide.ops != NULL);
+    for (int i = 0; i < 30; i++) {
+        const double n = 0.4 + 0.05 * i, narrow = 1 + (n - 1) / width;
+        const double f = force_at(&wide, 1, slack + l_opt * n, 0);
+        assert_true(fabs(f - force_at(&plain, 1, slack + l_opt * narrow, 0)) < 1e-9);
+        assert_true(force_at(&wide, 0, slack + l_opt * n, 0) == 0); /* nothing passive */
+    }
+    plain.ops->destroy(plain.self);
+    wide.ops->destroy(wide.self);
+    /* a Thelen curve does not take it for its own shape */
+    struct test_hill thelen = test_hill(&m, 1, "curves: thelen2003");
+    m.active_shape = NAN;
+    struct test_hill unstated = test_hill(&m, 1, "curves: thelen2003");
+    assert_true(force_at(&thelen, 1, 0.27, 0) == force_at(&unstated, 1, 0.27, 0));
+    thelen.ops->destroy(thelen.self);
+    unstated.ops->destroy(unstated.self);
 }
 
 static int rate_of(void *data, const double *x, double *y) {
@@ -289,6 +377,8 @@ static void refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(force_derivatives),
+                                       cmocka_unit_test(active_curve_as_wide_as_the_file_says),
+                                       cmocka_unit_test(derivatives_by_numbers),
                                        cmocka_unit_test(pushes_only_by_its_damping),
                                        cmocka_unit_test(activation_derivatives),
                                        cmocka_unit_test(activation_landmarks),
