@@ -256,20 +256,11 @@ static mhe_status take_solution(mhi_calibration *c, problem *p, mhe_error *err) 
     const ptrdiff_t x = (ptrdiff_t)(f->n_intervals + 1) * f->n_x,
                     u = (ptrdiff_t)f->n_intervals * f->n_u;
     p->s = (mhe_solution){.size = sizeof p->s};
-    struct {
-        double **array;
-        ptrdiff_t n;
-    } wanted[] = {{&p->s.x, x},          {&p->s.u, u},        {&p->s.lambda, x},
-                  {&p->s.zx_lower, x},   {&p->s.zx_upper, x}, {&p->s.zu_lower, u},
-                  {&p->s.zu_upper, u},   {&p->s.p, c->n},     {&p->s.zp_lower, c->n},
-                  {&p->s.zp_upper, c->n}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&c->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&p->s.x, x},          {&p->s.u, u},        {&p->s.lambda, x},
+                              {&p->s.zx_lower, x},   {&p->s.zx_upper, x}, {&p->s.zu_lower, u},
+                              {&p->s.zu_upper, u},   {&p->s.p, c->n},     {&p->s.zp_lower, c->n},
+                              {&p->s.zp_upper, c->n}};
+    return MHI_TAKE_ROOMS(&c->arena, rooms, err);
 }
 
 /* Bounds of a node. Activations follow excitations that have bounds, so that behind a first node
