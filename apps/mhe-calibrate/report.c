@@ -13,7 +13,10 @@ const char *report_outcome(const mhi_calibration *c) {
 }
 
 const char *report_verdict(const mhi_estimated *e) {
-    return e->at_bound ? "at bound" : e->informed ? "informed" : "not informed";
+    return e->at_bound    ? "at bound"
+           : isnan(e->sd) ? "no deviation"
+           : e->informed  ? "informed"
+                          : "not informed";
 }
 
 static void find_in(const mhi_estimated *e, mhi_text *out) {
