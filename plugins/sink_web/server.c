@@ -349,13 +349,18 @@ static mhe_status web_poll(void *self, double seconds, mhe_error *err) {
     return MHE_OK;
 }
 
+static void web_wake(void *self) {
+    lws_cancel_service(((web *)self)->context);
+}
+
 static const mhe_sink_ops web_ops = {.size = sizeof web_ops,
                                      .create = web_create,
                                      .destroy = web_destroy,
                                      .open = web_open,
                                      .take = web_take,
                                      .poll = web_poll,
-                                     .close = web_close};
+                                     .close = web_close,
+                                     .wake = web_wake};
 
 static const mhe_option web_options[] = {
     MHE_OPT_TEXT(struct web_config, address, 0, "127.0.0.1",
