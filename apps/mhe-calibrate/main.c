@@ -67,8 +67,16 @@ static mhe_status out_folder(const arguments *a, const mhi_run *run, mhi_text *o
     return out->failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
 }
 
-/* The config with the solver that section calibrate asks for: all of a motion at once needs no
- * real-time iteration; and that of the start. */
+/* What solves a whole motion at once, which needs no real-time iteration. */
+static const char *solver_setting(const mhi_plan *plan, int32_t ipopt, mhi_arena *arena) {
+    return mhi_arena_format(arena,
+                            "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %g}",
+                            ipopt ? "ipopt" : "rti", ipopt ? "" : "preset: robust, ",
+                            (int)plan->max_iterations, fmax(1e-12, fmin(1e-4, plan->tolerance)));
+}
+
+/* The config with the solver that section calibrate asks for, and that of the start: the same start
+ * whatever the solver is, since first activations are expected near those that it finds. */
 static mhe_status read_run(const arguments *a, const mhe_host *host, mhi_registry *registry,
                            mhi_run **run, mhi_run **start, mhe_error *err) {
     mhi_plan plan;
@@ -97,13 +105,11 @@ static mhe_status read_run(const arguments *a, const mhe_host *host, mhi_registr
         if (plan.scale != NULL) {
             set[n++] = model.data;
         }
-        set[n++] = mhi_arena_format(
-            &arena, "solver={plugin: mhe.solver.%s, %smax_iterations: %d, tolerance: %g}",
-            plan.solver == 0 ? "rti" : "ipopt", plan.solver == 0 ? "preset: robust, " : "",
-            (int)plan.max_iterations, fmax(1e-12, fmin(1e-4, plan.tolerance)));
+        set[n++] = solver_setting(&plan, plan.solver, &arena);
         mhi_run_free(*run);
         *run = NULL;
         status = mhi_run_read(a->config, set, n, registry, run, err);
+        set[n - 1] = solver_setting(&plan, 0, &arena);
         set[n++] = START_COSTS;
     }
     if (status == MHE_OK) {

@@ -35,23 +35,70 @@ static void find_in(const mhi_estimated *e, mhi_text *out) {
 
 #define ABOVE_MVC 1.05 /* what a sample may reach by noise alone */
 
-/* EMG beyond the maximum that it was divided by. */
-static void find_in_emg(const mhi_calibration *c, mhi_text *out) {
+/* Least and most of a muscle's EMG over the recordings, or over those that are learned from. */
+static void emg_range(const mhi_calibration *c, int32_t m, int32_t learned, double *least,
+                      double *most) {
     const int32_t n_m = c->model->n_muscles;
-    for (int32_t m = 0; m < n_m; m++) {
-        double most = 0;
-        for (int32_t i = 0; i < c->plan.n_recordings; i++) {
-            const mhi_recording *r = c->motions[i].recording;
-            for (int32_t k = 0; r->emg != NULL && k < r->n_frames; k++) {
-                most = fmax(most, r->emg[(ptrdiff_t)k * n_m + m]);
-            }
+    *least = INFINITY;
+    *most = -INFINITY;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        const mhi_recording *r = c->motions[i].recording;
+        const int32_t counts = r->emg != NULL && !(learned && c->plan.recordings[i].hold_out);
+        for (int32_t k = 0; counts && k < r->n_frames; k++) {
+            *least = fmin(*least, r->emg[(ptrdiff_t)k * n_m + m]);
+            *most = fmax(*most, r->emg[(ptrdiff_t)k * n_m + m]);
         }
-        if (most > ABOVE_MVC) {
+    }
+}
+
+/* EMG beyond the maximum that it was divided by, and EMG that never changes. */
+static void find_in_emg(const mhi_calibration *c, mhi_text *out) {
+    for (int32_t m = 0; m < c->model->n_muscles; m++) {
+        const char *name = c->model->muscles[m].name;
+        const mhi_estimated *gain = mhi_calibration_find(c, MHI_OF_GAIN, m, -1);
+        double least, most;
+        emg_range(c, m, 0, &least, &most);
+        if (most > ABOVE_MVC && gain == NULL) {
             mhi_text_add(out,
                          "EMG of %s reaches %.2f times its MVC, which was no maximum: without an "
                          "emg_gain for it, forces are too large\n",
-                         c->model->muscles[m].name, most);
+                         name, most);
+        } else if (most > ABOVE_MVC) {
+            mhi_text_add(out,
+                         "EMG of %s reaches %.2f times its MVC, which was no maximum: its emg_gain "
+                         "became %.2f\n",
+                         name, most, gain->value);
         }
+        emg_range(c, m, 1, &least, &most);
+        if (least == most) {
+            mhi_text_add(out,
+                         "EMG of %s is %.3g in every sample that was learned from: was the "
+                         "electrode off? Leave it out, forces follow it\n",
+                         name, most);
+        }
+    }
+}
+
+#define BADLY 0.005 /* m */
+#define WORSE 4.0
+
+/* Markers that fit far worse in one recording than in another, with the same person's numbers. */
+static void find_in_recording(const report_content *r, const report_recording *one, mhi_text *out) {
+    const report_recording *best = &r->recordings[0];
+    for (int32_t i = 1; i < r->n_recordings; i++) {
+        best = r->recordings[i].after.marker < best->after.marker ? &r->recordings[i] : best;
+    }
+    if (one->held_out && one->after.marker > 1.2 * one->before.marker) {
+        mhi_text_add(out,
+                     "%s, held out: markers fit worse than before (%.3g mm, %.3g mm): what was "
+                     "learned does not carry over\n",
+                     one->name, 1e3 * one->after.marker, 1e3 * one->before.marker);
+    }
+    if (one->after.marker > BADLY && one->after.marker > WORSE * best->after.marker) {
+        mhi_text_add(out,
+                     "%s: markers stay %.3g mm off, in %s %.3g mm: another person, other units, or "
+                     "markers that were set anew?\n",
+                     one->name, 1e3 * one->after.marker, best->name, 1e3 * best->after.marker);
     }
 }
 
@@ -68,13 +115,7 @@ void report_findings(report_content *r) {
         find_in(&c->list[i], &r->findings);
     }
     for (int32_t i = 0; i < r->n_recordings; i++) {
-        const report_recording *one = &r->recordings[i];
-        if (one->held_out && one->after.marker > 1.2 * one->before.marker) {
-            mhi_text_add(&r->findings,
-                         "%s, held out: markers fit worse than before (%.3g mm, %.3g mm): what was "
-                         "learned does not carry over\n",
-                         one->name, 1e3 * one->after.marker, 1e3 * one->before.marker);
-        }
+        find_in_recording(r, &r->recordings[i], &r->findings);
     }
 }
 

@@ -5,7 +5,7 @@
  * exponential with k_PE = 4, shifted as OpenSim's DeGrooteFregly2016Muscle does: 0 at n = 0.2 and 1
  * at n = 1 + e0 (the article's own passes 0 at n = 1 and would push below). e0 is the muscle's
  * passive strain, 0.6 where not stated. Pennation at constant thickness; s is the fibre velocity
- * over vmax. No kinks.
+ * over vmax. No kinks. OpenSim's active_force_width_scale w is there: fl(1 + (n - 1) / w).
  *
  * A rigid tendon's fibre pushes below n = 0.2 (by 0.02 F_max at n = 0, no length that a fibre has)
  * and faster than vmax, where the article's fv goes on below 0; with `damping` also where an idle
@@ -26,17 +26,25 @@ const double hill_degroote_bells[3][4] = {
 const double hill_degroote_velocity[4] = {-0.3211346127989808, -8.149, -0.374, 0.8825327733249912};
 #define DEGROOTE_SHORTEST 0.2 /* n at which the passive curve is 0 */
 
+/* The three bells, stretched about n = 1. */
+static struct hill_shape degroote_active(const struct hill_muscle *muscle, double n) {
+    const double narrow = 1 / muscle->active_width;
+    struct hill_shape fl = hill_three_bells(hill_degroote_bells, 1 + narrow * (n - 1));
+    fl.slope *= narrow;
+    return fl;
+}
+
 static void degroote_curve(const struct hill_muscle *muscle, double a, double n, double s,
                            struct hill_value *out) {
     struct hill_shape fp =
         hill_exponential(n, muscle->passive_rate, muscle->passive_offset, muscle->passive_scale);
-    hill_total(a, hill_three_bells(hill_degroote_bells, n), 0,
-               hill_log_velocity(hill_degroote_velocity, s), fp, out);
+    hill_total(a, degroote_active(muscle, n), 0, hill_log_velocity(hill_degroote_velocity, s), fp,
+               out);
 }
 
 static void degroote_lengths(const struct hill_muscle *muscle, double n, struct hill_shape *fl,
                              struct hill_shape *fp) {
-    *fl = hill_three_bells(hill_degroote_bells, n);
+    *fl = degroote_active(muscle, n);
     *fp = hill_exponential(n, muscle->passive_rate, muscle->passive_offset, muscle->passive_scale);
 }
 
@@ -78,7 +86,10 @@ static void degroote_prepare(const mhe_muscle *muscle, const struct hill_config 
     const double shape = 4;
     hill_published_geometry(muscle, config, out);
     out->curve = degroote_curve;
-    out->many = HILL_MANY_DEGROOTE;
+    /* a Thelen muscle's own shape is not this one's */
+    const int32_t own = muscle->type == MHE_MUSCLE_DEGROOTE2016;
+    out->active_width = own ? hill_or(muscle->active_shape, 1) : 1;
+    out->many = out->active_width == 1 ? HILL_MANY_DEGROOTE : HILL_MANY_NONE;
     out->passive_rate = shape / hill_or(muscle->passive_strain, 0.6);
     out->passive_offset = exp(out->passive_rate * (DEGROOTE_SHORTEST - 1));
     out->passive_scale = 1 / (exp(shape) - out->passive_offset);

@@ -91,7 +91,9 @@ static void thelen_prepare(const mhe_muscle *muscle, const struct hill_config *c
     double shape = hill_or(muscle->passive_shape, 5);
     hill_published_geometry(muscle, config, out);
     out->curve = thelen_curve;
-    out->active_width = hill_or(muscle->active_shape, 0.45);
+    /* a De Groote muscle's own shape is not this one's */
+    const int32_t own = muscle->type != MHE_MUSCLE_DEGROOTE2016;
+    out->active_width = own ? hill_or(muscle->active_shape, 0.45) : 0.45;
     out->passive_rate = shape / hill_or(muscle->passive_strain, 0.6);
     out->passive_scale = 1 / expm1(shape);
     out->concentric = 1 / hill_or(muscle->velocity_shape, 0.25);

@@ -58,6 +58,8 @@ struct hill_rule {
 };
 
 static mhe_status hill_check(const mhe_muscle *m, mhe_error *err) {
+    /* infinite: no passive force */
+    const double passive = m->passive_strain == INFINITY ? 1 : m->passive_strain;
     const struct hill_rule rules[] = {
         {"maximal isometric force", m->max_isometric_force, 0, 1, 1},
         {"optimal fibre length", m->optimal_fiber_length, 0, 1, 1},
@@ -67,7 +69,7 @@ static mhe_status hill_check(const mhe_muscle *m, mhe_error *err) {
         {"activation time constant", m->activation_time, 0, 0, 1},
         {"deactivation time constant", m->deactivation_time, 0, 0, 1},
         {"fibre damping", m->fiber_damping, 0, 0, 0},
-        {"passive strain", m->passive_strain, 0, 0, 1},
+        {"passive strain", passive, 0, 0, 1},
         {"passive shape", m->passive_shape, 0, 0, 1},
         {"active shape", m->active_shape, 0, 0, 1},
         {"force-velocity shape", m->velocity_shape, 0, 0, 1},

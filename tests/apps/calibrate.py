@@ -178,6 +178,26 @@ def test_where_and_when():
     assert any(abs(delay - early) < 0.004 for delay in delays), delays
 
 
+def test_delay():
+    """Motions of 2 s without noise: a delay is off by less than half its standard deviation, whatever it is."""
+    config = re.sub("([ABC])_emg", r"\1_late", CONFIG).replace("model.osim", ARM)
+    for early in (0, 0.01):
+        for motion in "ABC":
+            with open(motion + "/emg.sto") as file:
+                lines = file.read().split("\n")
+            head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+            rows = [line.split("\t", 1) for line in lines[head + 1:] if line]
+            write(motion + "_late.sto", "\n".join(lines[:head + 1] + ["%.4f\t%s" % (float(row[0]) - early, row[1])
+                                                                     for row in rows]) + "\n")
+        write("delay.yaml", config[:config.index("  parameters:")] +
+              "  parameters:\n    - {name: emg_delay, together: true, lower: -0.1, mean: 0, sd: 0.1}\n")
+        done = run(CALIBRATE, "delay.yaml", "--out", "delay", "--quiet")
+        assert done.returncode == 0, done.stderr
+        with open("delay/parameters.csv") as file:
+            row = next(csv.DictReader(file))
+        assert abs(float(row["after"]) - early) < 0.5 * float(row["sd"]) < 0.0025, (early, row)
+
+
 def expect(what, config, *words):
     write("bad.yaml", config)
     done = run(CALIBRATE, "bad.yaml", "--out", "bad", "--quiet")
@@ -368,6 +388,7 @@ def test_told():
     lines = [line for line in done.stderr.split("\n") if " of " in line and "warning" not in line]
     assert any(line.startswith("emg_gain of Latissimus1: not informed") for line in lines), lines
     assert any("max_isometric_force of TricepsLong: the data contradict" in line for line in lines), lines
+    assert not any("TricepsLong: not informed" in line for line in lines), lines
     assert any("max_isometric_force of BRA stands at its bound, 1.01" in line for line in lines), lines
     with open("told/parameters.csv") as file:
         rows = {row["parameter"]: row for row in csv.DictReader(file)}
@@ -397,6 +418,28 @@ def test_channels():
     assert any("B_odd.sto: the same value" in line and "SubScap" in line for line in lines), lines
     told = [line for line in lines if "times its MVC" in line]
     assert len(told) == 1 and told[0].startswith("EMG of BRD reaches 1.20 times its MVC"), told
+    assert "emg_gain for it" in told[0], told
+    done = run(CALIBRATE, "odd.yaml", "--out", "odd", "--set", "calibrate.max_iterations=1", "--set", "calibrate.recordings=["
+               "{markers: B/markers.trc, emg: B_odd.sto}]", "--set", "calibrate.parameters=[{name: emg_gain, muscles: [BRD]}]")
+    assert done.returncode == 0, done.stderr
+    assert "EMG of SubScap is 0.2 in every sample" in done.stderr, done.stderr
+    assert re.search(r"EMG of BRD reaches 1.20 times its MVC.*its emg_gain became", done.stderr), done.stderr
+
+
+def test_another_person():
+    """5 % larger all over: too little to be refused by the markers' distances, but no model fits both."""
+    with open("B/markers.trc") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+    for i in range(head, len(lines)):
+        cells = lines[i].split("\t")
+        lines[i] = "\t".join(cells[:2] + ["%.6f" % (1.05 * float(cell)) if cell else "" for cell in cells[2:]])
+    write("larger.trc", "\n".join(lines))
+    write("larger.yaml", CONFIG.replace("B/markers.trc", "larger.trc"))
+    done = run(CALIBRATE, "larger.yaml", "--out", "larger", "--set", "calibrate.max_iterations=2")
+    assert done.returncode == 0, done.stderr
+    told = [line for line in done.stderr.split("\n") if "another person" in line]
+    assert len(told) == 1 and told[0].startswith("larger.trc: markers stay 2"), done.stderr
 
 
 def test_wrong_input():
@@ -414,6 +457,8 @@ def test_wrong_input():
            "exact")
     expect("twice", CONFIG.replace("[BRA, Deltoid2]", "[BRA, BRA]"), "bad.yaml:14", "BRA", "twice")
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
+    expect("no motion", CONFIG.replace("markers: B/markers.trc, ", ""), "bad.yaml:10", "markers", "angles")
+    expect("no EMG", re.sub(", emg: ._emg.sto", "", CONFIG), "bad.yaml:14", "emg_gain", "no recording")
     expect("nothing to learn from", CONFIG.replace("reference.sto}", "reference.sto, hold_out: true}"), "bad.yaml", "learn")
     with open("B/markers.trc") as file:  # another person's forearm: the last two markers 20 % farther from the one before
         lines = file.read().split("\n")
@@ -438,12 +483,14 @@ def main():
         make_person("ABC")
         test_finds()
         test_where_and_when()
+        test_delay()
         test_loaded()
         test_walks()
         test_scales_first()
         test_solvers_agree()
         test_told()
         test_channels()
+        test_another_person()
         test_wrong_input()
 
 

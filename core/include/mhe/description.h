@@ -199,9 +199,11 @@ typedef struct mhe_muscle {
     double minimum_activation;          /* NaN */
     double min_control, max_control;    /* limits of the excitation; NaN */
     double fiber_damping;               /* NaN */
-    double passive_strain;              /* Thelen e0: strain at one norm force; NaN */
+    double passive_strain;              /* Thelen, De Groote e0: strain at one norm force; infinite:
+                                           no passive force; NaN */
     double passive_shape;               /* Thelen k_PE; NaN */
-    double active_shape;                /* Thelen gamma (KshapeActive); NaN */
+    double active_shape;                /* Thelen gamma (KshapeActive); De Groote: how many times
+                                           as wide the active curve is about 1; NaN */
     double velocity_shape;              /* Thelen A_f; NaN */
     double max_lengthening_force;       /* Thelen F_len, in F_max; NaN */
     double tendon_strain;               /* Thelen, De Groote: strain at one norm force; NaN */

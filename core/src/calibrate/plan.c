@@ -141,7 +141,13 @@ static mhe_status read_entries(mhi_run *run, const mhi_node *list, mhi_plan *pla
 static mhe_status read_recordings(mhi_run *run, mhi_registry *registry, const mhi_node *list,
                                   mhi_plan *plan, mhe_error *err) {
     const mhi_data_section *data = &run->data;
-    const int32_t own = data->markers != NULL || data->emg != NULL || data->angles != NULL;
+    const int32_t own = data->markers != NULL || data->angles != NULL;
+    if (data->emg != NULL && !own) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree,
+                           mhi_node_find(mhi_tree_root(run->tree), "data"),
+                           "data: emg without 'markers' or 'angles': there is no motion to learn "
+                           "from");
+    }
     if (list != NULL && list->kind != MHI_SEQUENCE) {
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, list,
                            "calibrate.recordings: must be a list: [{markers: FILE, emg: FILE}, "
@@ -169,6 +175,11 @@ static mhe_status read_recordings(mhi_run *run, mhi_registry *registry, const mh
         status = mhi_options_fill(recording_options, N(recording_options), run->tree, node, NULL, 0,
                                   "calibrate.recordings", run->dir, &run->arena, r, err);
         r->node = node;
+        if (status == MHE_OK && r->markers == NULL && r->angles == NULL) {
+            status = mhi_fail_at(err, MHE_E_CONFIG, run->tree, node,
+                                 "calibrate.recordings: neither 'markers' nor 'angles' is given: "
+                                 "there is no motion to learn from");
+        }
         if (status == MHE_OK && r->external_loads != NULL) {
             status = mhi_run_read_loads(run, registry, r->external_loads,
                                         mhi_node_find(node, "external_loads"), &r->loads, err);

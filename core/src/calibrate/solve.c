@@ -211,12 +211,15 @@ static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junc
     }
 }
 
-/* Of a motion's first activations and fibre lengths (m), about where they were found. */
-#define FIRST_SD 0.1
+/* Of a motion's first activations and fibre lengths (m), about where they were found. Activations
+ * may be anywhere within their bounds: the estimator finds them with the wrong model, and what
+ * holds them there moves what else explains the first moments, a delay above all (by 6 ms at 0.1).
+ */
+#define FIRST_SD 1.0
 #define FIRST_LENGTH_SD 0.01
 
 /* Nothing tells the first activations of redundant muscles apart but what comes before: they stay
- * near those of the start. */
+ * near those of the start, as far as the motion says nothing of them. */
 static mhe_status hold_beginnings(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_system *f = mhi_system_face(p->system);
     double *weight = MHI_TAKE(&c->arena, double, f->n_x);
@@ -328,7 +331,8 @@ static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
         const double margin = 1e-4 * (e->upper - e->lower);
         e->at_bound = e->value < e->lower + margin || e->value > e->upper - margin;
         e->sd = p->solver->covariance == NULL ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
-        e->informed = e->at_bound || !(e->sd > 0.95 * e->prior_sd);
+        e->informed =
+            e->at_bound || !(e->sd > 0.95 * e->prior_sd) || fabs(e->value - e->mean) > e->prior_sd;
         if (e->at_bound) {
             e->sd = 0;
         }
@@ -367,6 +371,23 @@ mhe_status mhi_calibration_solve(mhi_calibration *c, mhe_error *err) {
     return status;
 }
 
+/* What is asked of EMG needs some. */
+static mhe_status check_emg(const mhi_calibration *c, mhe_error *err) {
+    int32_t has = 0;
+    for (int32_t i = 0; i < c->plan.n_recordings; i++) {
+        has |= !c->plan.recordings[i].hold_out && c->motions[i].recording->emg != NULL;
+    }
+    for (int32_t i = 0; i < c->plan.n_entries && !has; i++) {
+        const mhi_plan_entry *e = &c->plan.entries[i];
+        if (e->kind == MHI_OF_GAIN || e->kind == MHI_OF_SHAPE || e->kind == MHI_OF_DELAY) {
+            return mhi_fail_at(err, MHE_E_CONFIG, c->run->tree, e->node,
+                               "calibrate.parameters: %s: no recording to learn from has EMG",
+                               mhi_plan_names[e->kind]);
+        }
+    }
+    return MHE_OK;
+}
+
 mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry *registry,
                                 const mhe_host *host, mhi_calibration *c, mhe_error *err) {
     *c = (mhi_calibration){.run = run, .start = start, .host = host};
@@ -384,6 +405,7 @@ mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry
     for (int32_t i = 0; i < c->plan.n_recordings && status == MHE_OK; i++) {
         status = mhi_motion_read(c, i, err);
     }
+    status = status == MHE_OK ? check_emg(c, err) : status;
     return status == MHE_OK ? mhi_calibration_check_person(c, err) : status;
 }
 

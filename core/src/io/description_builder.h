@@ -45,8 +45,9 @@ typedef struct mhi_body_draft {
 
 typedef struct mhi_coordinate_draft {
     mhe_coordinate coordinate;
-    int32_t locked;        /* stays at its default value */
-    int32_t moves_nothing; /* for the builder: no body, and no other coordinate */
+    const char *joint, *in_joint; /* for the reader: its joint, and its name there */
+    int32_t locked;               /* stays at its default value */
+    int32_t moves_nothing;        /* for the builder: no body, and no other coordinate */
     int32_t line;
 } mhi_coordinate_draft;
 

@@ -138,9 +138,8 @@ static void check_inertia(mhi_builder *b, mhi_body_draft *draft) {
         fmin(fmin(m[0] * m[4] - m[1] * m[1], m[0] * m[8] - m[2] * m[2]), m[4] * m[8] - m[5] * m[5]);
     double det = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
                  m[2] * (m[3] * m[7] - m[4] * m[6]);
-    if (fmin(fmin(m[0], m[4]), m[8]) < 0) {
-        mhi_build_fail(b, draft->line, "the inertia of body '%s' is not positive", body->name);
-    } else if (minor < -slack * scale || det < -slack * scale * scale) {
+    if (fmin(fmin(m[0], m[4]), m[8]) < 0 || minor < -slack * scale ||
+        det < -slack * scale * scale) {
         mhi_build_warn(b, draft->line,
                        "the inertia of body '%s' is not positive about every axis: kept, as "
                        "OpenSim does",

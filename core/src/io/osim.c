@@ -5,10 +5,12 @@
 #include "io/model_file.h"
 
 #include <limits.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include <libxml/parser.h>
 
+#define FORWARD_ONLY "controllers drive a forward simulation only"
 #define AFTER 50000 /* of versions, as files write them */
 
 /* What drives a forward simulation, and what is only computed beside it. */
@@ -22,10 +24,34 @@ static void drop_set(mhi_osim *o, const char *set, const char *why) {
 }
 
 static void list_components(mhi_osim *o, xmlNode *holder) {
-    static const char *const harmless[] = {"PhysicalOffsetFrame", "Station", "Marker", "IMU"};
+    static const char *const harmless[] = {"Body",
+                                           "PhysicalOffsetFrame",
+                                           "StationDefinedFrame",
+                                           "Station",
+                                           "Marker",
+                                           "PathPoint",
+                                           "IMU",
+                                           "Mesh",
+                                           "Sphere",
+                                           "Brick",
+                                           "Cone",
+                                           "Cylinder",
+                                           "Arrow",
+                                           "Ellipsoid",
+                                           "Torus",
+                                           "Line",
+                                           "FrameGeometry"};
     for (xmlNode *n = mhi_xml_first(holder); n != NULL; n = mhi_xml_next(n)) {
-        if (!mhi_xml_one_of(n, harmless, sizeof harmless / sizeof *harmless) &&
-            !mhi_osim_force(o, n)) {
+        if (mhi_xml_ends(n, "Reporter") || mhi_xml_ends(n, "Metabolics") ||
+            mhi_xml_ends(n, "MetabolicCost")) {
+            mhi_build_dropped(&o->b, mhi_xml_line(n), "%s '%s': it is computed beside a simulation",
+                              (const char *)n->name, mhi_xml_name(o, n));
+        } else if (mhi_xml_ends(n, "Controller")) {
+            mhi_build_dropped(&o->b, mhi_xml_line(n), "%s '%s': %s", (const char *)n->name,
+                              mhi_xml_name(o, n), FORWARD_ONLY);
+        } else if (!mhi_xml_one_of(n, harmless, sizeof harmless / sizeof *harmless) &&
+                   !mhi_xml_ends(n, "Joint") && !mhi_xml_ends(n, "Constraint") &&
+                   !mhi_osim_force(o, n)) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "component %s '%s': left out",
                                   (const char *)n->name, mhi_xml_name(o, n));
         }
@@ -35,18 +61,40 @@ static void list_components(mhi_osim *o, xmlNode *holder) {
 /* Elements of <Model> that are read elsewhere or have no part in the mechanics; a
  * ContactGeometrySet alone makes no force, a wrap object that no path names neither. */
 static void list_unknown(mhi_osim *o) {
-    static const char *const known[] = {
-        "credits",         "publications",       "length_units",  "force_units",
-        "gravity",         "assembly_accuracy",  "Ground",        "BodySet",
-        "JointSet",        "ForceSet",           "MarkerSet",     "ConstraintSet",
-        "ControllerSet",   "ContactGeometrySet", "ProbeSet",      "ComponentSet",
-        "components",      "defaults",           "WrapObjectSet", "ModelVisualPreferences",
-        "ModelVisualizer", "show_visualizer",    "FrameSet",      "frames",
-        "notes",           "model_version",      "VisibleObject"};
+    enum { WORDS = 5 }; /* the first of them change nothing, however many there are */
+    static const char *const known[] = {"credits",
+                                        "publications",
+                                        "notes",
+                                        "model_version",
+                                        "VisibleObject",
+                                        "length_units",
+                                        "force_units",
+                                        "gravity",
+                                        "Ground",
+                                        "BodySet",
+                                        "JointSet",
+                                        "ForceSet",
+                                        "MarkerSet",
+                                        "ConstraintSet",
+                                        "ControllerSet",
+                                        "ContactGeometrySet",
+                                        "ProbeSet",
+                                        "ComponentSet",
+                                        "components",
+                                        "defaults",
+                                        "WrapObjectSet",
+                                        "FrameSet",
+                                        "show_visualizer",
+                                        "ModelVisualPreferences",
+                                        "frames",
+                                        "ModelVisualizer",
+                                        "assembly_accuracy"};
     for (xmlNode *n = mhi_xml_first(o->model); n != NULL; n = mhi_xml_next(n)) {
         if (!mhi_xml_one_of(n, known, sizeof known / sizeof *known)) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "element <%s>: left out",
                                   (const char *)n->name);
+        } else if (mhi_xml_one_of(n, known, WORDS)) {
+            continue;
         } else if (mhi_xml_child(o->model, (const char *)n->name) != n) {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "a second <%s>: left out",
                                   (const char *)n->name);
@@ -79,7 +127,7 @@ static void read_model(mhi_osim *o) {
     mhi_osim_obstacles(o);
     mhi_osim_forces(o);
     read_markers(o);
-    drop_set(o, "ControllerSet", "controllers drive a forward simulation only");
+    drop_set(o, "ControllerSet", FORWARD_ONLY);
     drop_set(o, "ProbeSet", "probes are computed beside a simulation");
     list_components(o, mhi_xml_child(o->model, "components"));
     list_components(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"));
@@ -187,15 +235,45 @@ static int32_t lacked_memory(xmlParserCtxt *context, const xmlDoc *document, con
     return !same;
 }
 
+static void fail_memory(mhi_osim *o) {
+    o->b.status = mhe_fail(o->b.err, MHE_E_MEMORY, "%s: out of memory", o->b.source);
+}
+
+static void read_text(mhi_osim *o, const char *text, int length);
+
+/* The text once more, as OpenSim's parser takes it; 0: it takes it no otherwise. */
+static int32_t read_tidied(mhi_osim *o, const char *text, int length) {
+    mhi_osim_tidied t;
+    if (o->tidied || !mhi_osim_tidy(text, (size_t)length, &t)) {
+        return 0;
+    }
+    o->tidied = 1;
+    if (t.text == NULL || t.length > INT_MAX) {
+        fail_memory(o);
+    } else {
+        if (t.plain_line > 0) {
+            mhi_build_warn(&o->b, t.plain_line, "'&' should be '&amp;': read as the letter");
+        }
+        if (t.comment_line > 0) {
+            mhi_build_warn(&o->b, t.comment_line,
+                           "a comment with '--' in it is no XML: it ends at its first '-->', as in "
+                           "OpenSim");
+        }
+        read_text(o, t.text, (int)t.length);
+    }
+    free(t.text);
+    return 1;
+}
+
 static void read_text(mhi_osim *o, const char *text, int length) {
     xmlParserCtxt *context = xmlNewParserCtxt();
     xmlDoc *document = context == NULL ? NULL : parse(context, text, length);
     if (context == NULL || lacked_memory(context, document, text, length)) {
-        o->b.status = mhe_fail(o->b.err, MHE_E_MEMORY, "%s: out of memory", o->b.source);
-    } else if (document == NULL) {
-        fail_syntax(o, context);
-    } else {
+        fail_memory(o);
+    } else if (document != NULL) {
         read_document(o, document);
+    } else if (!read_tidied(o, text, length)) {
+        fail_syntax(o, context);
     }
     xmlFreeDoc(document);
     xmlFreeParserCtxt(context);

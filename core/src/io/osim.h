@@ -7,21 +7,30 @@
 
 #include <libxml/tree.h>
 
-/* A frame fixed to another: PhysicalOffsetFrame. */
+/* A frame fixed to another: PhysicalOffsetFrame, or StationDefinedFrame. */
 typedef struct mhi_osim_frame {
     const char *path;   /* "/jointset/elbow/base_offset" */
     const char *owner;  /* "/jointset/elbow" */
     const char *parent; /* socket, as in the file */
     mhi_transform in_parent;
+    xmlNode *landmarks; /* the element, where it stands on points; NULL: it has a parent */
     int32_t line;
     int32_t visiting; /* a chain that comes back here is a loop */
 } mhi_osim_frame;
 
+/* A point that a frame may stand on: Station, Marker. */
+typedef struct mhi_osim_station {
+    const char *path;
+    xmlNode *node;
+} mhi_osim_station;
+
 typedef struct mhi_osim {
     mhi_builder b;
     xmlNode *model;
-    mhi_list frames; /* mhi_osim_frame */
-    int32_t depth;   /* of frames fixed to frames, while one is looked up */
+    mhi_list frames;   /* mhi_osim_frame */
+    mhi_list stations; /* mhi_osim_station */
+    int32_t depth;     /* of frames fixed to frames, while one is looked up */
+    int32_t tidied;    /* the text is the second try */
 } mhi_osim;
 
 /* osim_xml.c: elements and their values. Names are those of tags; memory is the builder's. */
@@ -53,10 +62,31 @@ int32_t mhi_xml_flag(mhi_osim *o, xmlNode *object, const char *name); /* absent:
 int32_t mhi_xml_stated_flag(mhi_osim *o, xmlNode *object, const char *name);
 /* First object of a set of the model: <BodySet><objects><...; NULL: none. */
 xmlNode *mhi_xml_objects(xmlNode *parent, const char *set);
+/* 1 where the tag ends so. */
+int32_t mhi_xml_ends(const xmlNode *node, const char *ending);
+/* The elements of a set of the model, then those that stand free among its <components>. */
+typedef struct mhi_osim_walk {
+    mhi_osim *o;
+    const char *set;
+    const char *owner; /* path of what holds the element: "/bodyset", "" for the model */
+    xmlNode *node;     /* NULL: there is none left */
+    int32_t place;
+} mhi_osim_walk;
+mhi_osim_walk mhi_osim_begin(mhi_osim *o, const char *set);
+xmlNode *mhi_osim_next(mhi_osim_walk *walk);
 /* 1 where the tag is one of the n names. */
 int32_t mhi_xml_one_of(const xmlNode *node, const char *const *names, size_t n);
 /* 0 where a force or constraint says that it is switched off, in any version's words. */
 int32_t mhi_xml_enabled(mhi_osim *o, xmlNode *object);
+
+/* osim_tidy.c: the file as OpenSim's own parser reads it, without comments, "&" that begins no
+ * entity spelt out. 0: there is nothing to mend. text is the caller's to free; NULL: no memory. */
+typedef struct mhi_osim_tidied {
+    char *text;
+    size_t length;
+    int32_t plain_line, comment_line; /* the first "&" and comment that are mended; 0: none */
+} mhi_osim_tidied;
+int32_t mhi_osim_tidy(const char *text, size_t length, mhi_osim_tidied *tidied);
 
 /* osim_frame.c: which body a socket means. */
 void mhi_osim_frames(mhi_osim *o);
@@ -66,6 +96,12 @@ const char *mhi_osim_socket(mhi_osim *o, xmlNode *object, const char *name);
  * an error. */
 int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int32_t line,
                          const char **body, mhi_transform *in_body);
+/* "../ground" seen from "/jointset/elbow" -> "/jointset/ground"; an absolute path as it is. */
+const char *mhi_osim_absolute(mhi_osim *o, const char *socket, const char *owner);
+/* osim_landmark.c: the body and the place in it of a frame that stands on points. 0 after an error.
+ */
+int32_t mhi_osim_landmark_frame(mhi_osim *o, const mhi_osim_frame *frame, const char **body,
+                                mhi_transform *in_body);
 /* Location of a point or marker, v4 (socket and location) or before (body and location), brought to
  * the body; 0 after an error. */
 int32_t mhi_osim_location(mhi_osim *o, xmlNode *object, const char **body, double location[3]);

@@ -57,12 +57,11 @@ static void read_coupler(mhi_osim *o, xmlNode *node) {
     }
 }
 
-static void read_loop(mhi_osim *o, xmlNode *node, int32_t kind) {
+static void read_loop(mhi_osim *o, xmlNode *node, const char *set, int32_t kind) {
     const char *body[2];
     mhi_transform frame[2];
     int32_t weld = kind == MHE_LOOP_WELD;
-    if (!mhi_osim_two_frames(o, node, "/constraintset", weld ? "frame" : "body_", "body_", body,
-                             frame)) {
+    if (!mhi_osim_two_frames(o, node, set, weld ? "frame" : "body_", "body_", body, frame)) {
         return;
     }
     if (body[0] == body[1] ||
@@ -86,17 +85,17 @@ static void read_loop(mhi_osim *o, xmlNode *node, int32_t kind) {
 }
 
 void mhi_osim_constraints(mhi_osim *o) {
-    for (xmlNode *n = mhi_xml_objects(o->model, "ConstraintSet");
-         n != NULL && o->b.status == MHE_OK; n = mhi_xml_next(n)) {
-        if (!mhi_xml_enabled(o, n)) {
+    mhi_osim_walk walk = mhi_osim_begin(o, "ConstraintSet");
+    for (xmlNode *n = walk.node; n != NULL && o->b.status == MHE_OK; n = mhi_osim_next(&walk)) {
+        if (!mhi_xml_ends(n, "Constraint") || !mhi_xml_enabled(o, n)) {
             continue;
         }
         if (mhi_xml_is(n, "CoordinateCouplerConstraint")) {
             read_coupler(o, n);
         } else if (mhi_xml_is(n, "PointConstraint")) {
-            read_loop(o, n, MHE_LOOP_POINT);
+            read_loop(o, n, walk.owner, MHE_LOOP_POINT);
         } else if (mhi_xml_is(n, "WeldConstraint")) {
-            read_loop(o, n, MHE_LOOP_WELD);
+            read_loop(o, n, walk.owner, MHE_LOOP_WELD);
         } else {
             mhi_build_unsupported(&o->b, mhi_xml_line(n), "%s '%s': not enforced",
                                   (const char *)n->name, mhi_xml_name(o, n));

@@ -29,13 +29,34 @@ static void read_prescribed(mhi_osim *o, xmlNode *node, mhi_coordinate_draft *dr
     }
 }
 
-static void read_coordinate(mhi_osim *o, xmlNode *node) {
+/* Since 4.0 coordinates of several joints may share a name, as those that programs make up ("rx")
+ * do; the later ones are called after their joint as well. */
+static const char *unique_name(mhi_osim *o, const mhi_osim_joint *j, const char *name,
+                               int32_t line) {
+    for (int32_t i = 0; i < j->first; i++) {
+        if (strcmp(COORDINATE(o, i)->coordinate.name, name) == 0) {
+            const char *longer = mhi_arena_format(&o->b.arena, "%s_%s", j->name, name);
+            mhi_build_warn(&o->b, line,
+                           "coordinate '%s' of joint '%s' is called '%s': there is one of that "
+                           "name in line %d",
+                           name, j->name, longer != NULL ? longer : "",
+                           (int)COORDINATE(o, i)->line);
+            return longer != NULL ? longer : name;
+        }
+    }
+    return name;
+}
+
+static void read_coordinate(mhi_osim *o, const mhi_osim_joint *j, xmlNode *node) {
     double range[2];
-    mhi_coordinate_draft *draft =
-        mhi_build_coordinate(&o->b, mhi_xml_name(o, node), mhi_xml_line(node));
+    const char *name = mhi_xml_name(o, node);
+    mhi_coordinate_draft *draft = mhi_build_coordinate(
+        &o->b, unique_name(o, j, name, mhi_xml_line(node)), mhi_xml_line(node));
     if (draft == NULL) {
         return;
     }
+    draft->joint = j->name;
+    draft->in_joint = name;
     if (*draft->coordinate.name == '\0') { /* before an axis looks for it */
         mhi_build_fail(&o->b, draft->line, "this coordinate has no name");
     }
@@ -57,7 +78,7 @@ void mhi_osim_coordinates(mhi_osim *o, mhi_osim_joint *j, int32_t n) {
     }
     for (; node != NULL; node = mhi_xml_next(node)) {
         if (mhi_xml_is(node, "Coordinate")) {
-            read_coordinate(o, node);
+            read_coordinate(o, j, node);
         }
     }
     for (int32_t i = o->b.coordinates.n - j->first; i < n; i++) {
@@ -77,10 +98,27 @@ void mhi_osim_motion(mhi_osim *o, mhi_osim_joint *j, int32_t kind, int32_t i,
                      mhi_xml_line(j->node));
 }
 
+/* "../elbow/rx": the coordinate rx of the joint elbow; -1: there is none. */
+static int32_t coordinate_at(const mhi_osim *o, const char *path, const char *plain) {
+    for (int32_t i = 0; plain > path && i < o->b.coordinates.n; i++) {
+        const mhi_coordinate_draft *draft = COORDINATE(o, i);
+        const size_t n = draft->joint == NULL ? 0 : strlen(draft->joint);
+        if (n > 0 && strcmp(draft->in_joint, plain) == 0 && (size_t)(plain - path) > n &&
+            strncmp(plain - 1 - n, draft->joint, n) == 0 &&
+            (plain - 1 - n == path || plain[-2 - (ptrdiff_t)n] == '/')) {
+            return i;
+        }
+    }
+    return -1;
+}
+
 int32_t mhi_osim_coordinate(mhi_osim *o, const char *name, int32_t line, const char *whose) {
     const char *slash = strrchr(name, '/');
     const char *plain = slash != NULL ? slash + 1 : name;
-    int32_t n = o->b.coordinates.n;
+    int32_t n = o->b.coordinates.n, exact = coordinate_at(o, name, plain);
+    if (exact >= 0) {
+        return exact;
+    }
     const char **names = mhi_build_take(&o->b, n, sizeof *names);
     for (int32_t i = 0; names != NULL && i < n; i++) {
         names[i] = COORDINATE(o, i)->coordinate.name;

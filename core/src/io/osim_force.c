@@ -143,6 +143,55 @@ static void read_ligament(mhi_osim *o, xmlNode *node) {
     }
 }
 
+/* Blankevoort & Huiskes (1991), doi:10.1115/1.2894883: over the strain e of the slack length no
+ * force, up to the transition strain t stiffness e^2 / (2 t), then stiffness (e - t / 2). */
+static mhe_function blankevoort_curve(mhi_osim *o, double stiffness, double transition) {
+    double *numbers = mhi_build_take(&o->b, 12, sizeof *numbers);
+    if (numbers == NULL) {
+        return (mhe_function){0};
+    }
+    double *origin = numbers, *coef = numbers + 3;
+    origin[0] = origin[1] = 1;
+    origin[2] = 1 + transition;
+    if (transition > 0) {
+        coef[5] = stiffness / (2 * transition);
+    }
+    coef[6] = stiffness * transition / 2;
+    coef[7] = stiffness;
+    return (mhe_function){.origin = origin, .coef = coef, .n_pieces = 3, .n_coef = 3};
+}
+
+/* Its damping is a force of `damping_coefficient` per unit of strain rate, while it is taut and
+ * lengthens: next to nothing in every public model (0.003 N s), and left out there. */
+static void read_blankevoort(mhi_osim *o, xmlNode *node) {
+    double stiffness = 1, transition = 0.06, damping = 0.003;
+    mhi_ligament_draft draft = {.ligament = {.scale = 1}};
+    if (!mhi_osim_path(o, node, "ligament", &draft.path)) {
+        return;
+    }
+    (void)mhi_xml_numbers(o, node, "slack_length", &draft.ligament.rest, 1);
+    (void)mhi_xml_numbers(o, node, "linear_stiffness", &stiffness, 1);
+    (void)mhi_xml_numbers(o, node, "transition_strain", &transition, 1);
+    (void)mhi_xml_numbers(o, node, "damping_coefficient", &damping, 1);
+    if (!(draft.ligament.rest > 0 && stiffness >= 0 && transition >= 0)) {
+        mhi_build_fail(&o->b, mhi_xml_line(node),
+                       "ligament '%s' needs a slack_length > 0 (has %g), linear_stiffness and "
+                       "transition_strain of at least 0 (%g, %g)",
+                       mhi_xml_name(o, node), draft.ligament.rest, stiffness, transition);
+        return;
+    }
+    if (damping > 1e-3 * stiffness) {
+        mhi_build_unsupported(&o->b, mhi_xml_line(node),
+                              "damping_coefficient %g of ligament '%s': it is not damped", damping,
+                              mhi_xml_name(o, node));
+    }
+    draft.ligament.curve = blankevoort_curve(o, stiffness, transition);
+    mhi_ligament_draft *out = mhi_build_push(&o->b, &o->b.ligaments, sizeof *out);
+    if (out != NULL) {
+        *out = draft;
+    }
+}
+
 static void read_bushing(mhi_osim *o, xmlNode *node) {
     const char *body[2];
     mhi_transform frame[2];
@@ -260,6 +309,7 @@ int32_t mhi_osim_force(mhi_osim *o, xmlNode *node) {
                  {"PathSpring", read_path_spring},
                  {"PointToPointSpring", read_point_spring},
                  {"Ligament", read_ligament},
+                 {"Blankevoort1991Ligament", read_blankevoort},
                  {"BushingForce", read_bushing},
                  {"CoordinateActuator", read_coordinate_actuator},
                  {"GeneralizedForce", read_coordinate_actuator},

@@ -11,10 +11,27 @@
 
 #define FRAME(o, i) ((mhi_osim_frame *)(o)->frames.items[i])
 
-/* Offset frames among the children of `holder`, which live at `owner`. */
+static const char *member(mhi_osim *o, const char *owner, const xmlNode *node) {
+    const char *path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, node));
+    return path != NULL ? path : "";
+}
+
+static void collect_station(mhi_osim *o, xmlNode *node, const char *path) {
+    mhi_osim_station *station = mhi_build_push(&o->b, &o->stations, sizeof *station);
+    if (station != NULL) {
+        *station = (mhi_osim_station){.path = path, .node = node};
+    }
+}
+
+/* Frames and points among the children of `holder`, which live at `owner`. */
 static void collect(mhi_osim *o, xmlNode *holder, const char *owner) {
     for (xmlNode *node = mhi_xml_first(holder); node != NULL; node = mhi_xml_next(node)) {
-        if (!mhi_xml_is(node, "PhysicalOffsetFrame")) {
+        const char *path = member(o, owner, node);
+        if (mhi_xml_is(node, "Station") || mhi_xml_is(node, "Marker")) {
+            collect_station(o, node, path);
+        }
+        const int32_t landmarks = mhi_xml_is(node, "StationDefinedFrame");
+        if (!landmarks && !mhi_xml_is(node, "PhysicalOffsetFrame")) {
             continue;
         }
         mhi_osim_frame *frame = mhi_build_push(&o->b, &o->frames, sizeof *frame);
@@ -22,44 +39,40 @@ static void collect(mhi_osim *o, xmlNode *holder, const char *owner) {
             return;
         }
         double angles[3] = {0};
-        frame->path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, node));
+        frame->path = path;
         frame->owner = owner;
         frame->parent = mhi_osim_socket(o, node, "parent");
+        frame->landmarks = landmarks ? node : NULL;
         frame->line = mhi_xml_line(node);
         (void)mhi_xml_numbers(o, node, "orientation", angles, 3);
         (void)mhi_xml_numbers(o, node, "translation", frame->in_parent.p, 3);
         mhi_rotation_sequence("xyz", angles, frame->in_parent.r);
-        if (frame->path == NULL) {
-            o->frames.n--;
-            return;
-        }
         collect(o, mhi_xml_child(node, "components"), frame->path);
     }
 }
 
-static const char *member(mhi_osim *o, const char *owner, const xmlNode *node) {
-    const char *path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, node));
-    return path != NULL ? path : "";
+/* Frames within the members of a set, and of those that stand free. */
+static void collect_members(mhi_osim *o, const char *set) {
+    mhi_osim_walk walk = mhi_osim_begin(o, set);
+    for (xmlNode *n = walk.node; n != NULL; n = mhi_osim_next(&walk)) {
+        const char *path =
+            walk.place == 0 || strcmp(set, "BodySet") == 0 ? member(o, walk.owner, n) : NULL;
+        if (path != NULL) { /* those that stand free are the same for every set */
+            collect(o, mhi_xml_child(n, "frames"), path);
+            collect(o, mhi_xml_child(n, "components"), path);
+        }
+    }
 }
 
 void mhi_osim_frames(mhi_osim *o) {
     collect(o, mhi_xml_child(o->model, "components"), "");
     collect(o, mhi_xml_child(mhi_xml_child(o->model, "ComponentSet"), "objects"), "/componentset");
     collect(o, mhi_xml_child(mhi_xml_child(o->model, "Ground"), "components"), "/ground");
-    for (xmlNode *n = mhi_xml_objects(o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
-        collect(o, mhi_xml_child(n, "components"), member(o, "/bodyset", n));
-    }
-    for (xmlNode *n = mhi_xml_objects(o->model, "JointSet"); n != NULL; n = mhi_xml_next(n)) {
-        const char *joint = member(o, "/jointset", n);
-        collect(o, mhi_xml_child(n, "frames"), joint);
-        collect(o, mhi_xml_child(n, "components"), joint);
-    }
-    for (xmlNode *n = mhi_xml_objects(o->model, "ConstraintSet"); n != NULL; n = mhi_xml_next(n)) {
-        collect(o, mhi_xml_child(n, "frames"), member(o, "/constraintset", n));
-    }
-    for (xmlNode *n = mhi_xml_objects(o->model, "ForceSet"); n != NULL; n = mhi_xml_next(n)) {
-        collect(o, mhi_xml_child(n, "frames"), member(o, "/forceset", n));
-    }
+    collect(o, mhi_xml_child(mhi_xml_child(o->model, "MarkerSet"), "objects"), "/markerset");
+    collect_members(o, "BodySet");
+    collect_members(o, "JointSet");
+    collect_members(o, "ConstraintSet");
+    collect_members(o, "ForceSet");
 }
 
 /* Between 3.3 and 4.0: <connectors><Connector_.. name="parent_frame"><connectee_name>. */
@@ -86,8 +99,7 @@ const char *mhi_osim_socket(mhi_osim *o, xmlNode *object, const char *name) {
     return text != NULL ? text : connector(o, object, name);
 }
 
-/* "../ground" seen from "/jointset/elbow" -> "/jointset/ground"; an absolute path as it is. */
-static const char *absolute(mhi_osim *o, const char *socket, const char *owner) {
+const char *mhi_osim_absolute(mhi_osim *o, const char *socket, const char *owner) {
     char *out = mhi_arena_take(&o->b.arena, strlen(owner) + strlen(socket) + 3);
     if (out == NULL) {
         return "";
@@ -160,7 +172,7 @@ int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int
         mhi_build_fail(&o->b, line, "this element names no body that it is fixed to");
         return 0;
     }
-    const char *path = absolute(o, socket, owner), *name = last_part(path);
+    const char *path = mhi_osim_absolute(o, socket, owner), *name = last_part(path);
     mhi_osim_frame *frame = frame_named(o, path, owner);
     int32_t exact = frame != NULL && strcmp(frame->path, path) == 0;
     *body = body_named(o, name);
@@ -183,12 +195,17 @@ int32_t mhi_osim_resolve(mhi_osim *o, const char *socket, const char *owner, int
         return 0;
     }
     mhi_transform parent;
+    int32_t ok;
     frame->visiting = 1;
     o->depth++;
-    int32_t ok = mhi_osim_resolve(o, frame->parent, frame->path, frame->line, body, &parent);
+    if (frame->landmarks != NULL) {
+        ok = mhi_osim_landmark_frame(o, frame, body, in_body);
+    } else {
+        ok = mhi_osim_resolve(o, frame->parent, frame->path, frame->line, body, &parent);
+        *in_body = mhi_transform_times(&parent, &frame->in_parent);
+    }
     o->depth--;
     frame->visiting = 0;
-    *in_body = mhi_transform_times(&parent, &frame->in_parent);
     return ok;
 }
 

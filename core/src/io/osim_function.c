@@ -59,11 +59,29 @@ static int32_t read_polynomial(mhi_osim *o, xmlNode *node, const char *whose,
     return 1;
 }
 
+/* A point that stands there twice is moved by what OpenSim takes for the least step of x
+ * (SimmMacros.h, TINY_NUMBER): its spline is then level there, and so is this one. 0: it is no such
+ * point. */
+static int32_t repeated(mhi_osim *o, xmlNode *node, const char *whose, double *x, const double *y,
+                        int32_t i) {
+    const double least = 1e-7;
+    const double at = x[i];
+    if (!(x[i - 1] - at <= least) || y[i] != y[i - 1]) {
+        return 0;
+    }
+    mhi_build_warn(&o->b, mhi_xml_line(node),
+                   "<%s> of %s has the point at %g twice: as in OpenSim it is level there",
+                   (const char *)node->name, whose, at);
+    x[i] = x[i - 1] + least;
+    return 1;
+}
+
 /* x and y of a spline or broken line; 0 after an error. */
 static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const double **x,
                            const double **y, int32_t *n) {
     int32_t n_y;
-    *x = mhi_xml_all_numbers(o, mhi_xml_property(node, "x"), n);
+    double *place = mhi_xml_all_numbers(o, mhi_xml_property(node, "x"), n);
+    *x = place;
     *y = mhi_xml_all_numbers(o, mhi_xml_property(node, "y"), &n_y);
     if (o->b.status != MHE_OK) {
         return 0;
@@ -75,7 +93,8 @@ static int32_t read_points(mhi_osim *o, xmlNode *node, const char *whose, const 
         return 0;
     }
     for (int32_t i = 1; i < *n; i++) {
-        if ((*x)[i] - (*x)[i - 1] <= X_APART * fabs((*x)[i])) {
+        if (place[i] - place[i - 1] <= X_APART * fabs(place[i]) &&
+            !repeated(o, node, whose, place, *y, i)) {
             mhi_build_fail(&o->b, mhi_xml_line(node), "<%s> of %s: x does not increase at %g",
                            (const char *)node->name, whose, (*x)[i]);
             return 0;

@@ -24,6 +24,20 @@ static void read_inertia(mhi_osim *o, xmlNode *node, double inertia[9]) {
     inertia[7] = inertia[5];
 }
 
+/* What has no mass has no inertia either: OpenSim takes 0 there (Body::getInertia()). */
+static void drop_inertia_without_mass(mhi_osim *o, mhi_body_draft *draft) {
+    double most = 0;
+    for (int i = 0; i < 9; i++) {
+        most = fmax(most, fabs(draft->body.inertia[i]));
+    }
+    if (draft->body.mass == 0 && most > 0) {
+        mhi_build_warn(&o->b, draft->line,
+                       "body '%s' has no mass but an inertia: as in OpenSim it has none",
+                       draft->body.name);
+        memset(draft->body.inertia, 0, sizeof draft->body.inertia);
+    }
+}
+
 /* Joints of a fixed kind: motions in order, each "R" or "T", its axis and its coordinate. The
  * translations of a PlanarJoint and FreeJoint are along axes of the parent, so they come first. */
 static const struct {
@@ -53,7 +67,7 @@ static int32_t joint_coordinate(mhi_osim *o, const mhi_osim_joint *j, const char
     char hint[256] = "";
     for (int32_t i = 0; names != NULL && i < j->n; i++) {
         const mhi_coordinate_draft *draft = o->b.coordinates.items[j->first + i];
-        names[i] = draft->coordinate.name;
+        names[i] = draft->in_joint != NULL ? draft->in_joint : draft->coordinate.name;
         if (strcmp(names[i], name) == 0) {
             return j->first + i;
         }
@@ -223,9 +237,9 @@ static int32_t read_end(mhi_osim *o, xmlNode *node, const char *owner, const cha
     return 1;
 }
 
-static int32_t read_ends(mhi_osim *o, xmlNode *node, ends *e) {
+static int32_t read_ends(mhi_osim *o, xmlNode *node, const char *set, ends *e) {
     const char *name = mhi_xml_name(o, node);
-    const char *owner = mhi_arena_format(&o->b.arena, "/jointset/%s", name);
+    const char *owner = mhi_arena_format(&o->b.arena, "%s/%s", set, name);
     *e = (ends){.joint = {.node = node, .name = name}};
     return owner != NULL && read_end(o, node, owner, "parent", &e->parent, &e->in_parent) &&
            read_end(o, node, owner, "child", &e->child, &e->in_child);
@@ -264,10 +278,13 @@ static void build_free(mhi_osim *o, mhi_body_draft *draft) {
 
 void mhi_osim_joints(mhi_osim *o) {
     mhi_list joints = {0};
-    for (xmlNode *n = mhi_xml_objects(o->model, "JointSet"); n != NULL && o->b.status == MHE_OK;
-         n = mhi_xml_next(n)) {
+    mhi_osim_walk walk = mhi_osim_begin(o, "JointSet");
+    for (xmlNode *n = walk.node; n != NULL && o->b.status == MHE_OK; n = mhi_osim_next(&walk)) {
+        if (!mhi_xml_ends(n, "Joint")) {
+            continue;
+        }
         ends *e = mhi_build_push(&o->b, &joints, sizeof *e);
-        if (e == NULL || !read_ends(o, n, e)) {
+        if (e == NULL || !read_ends(o, n, walk.owner, e)) {
             return;
         }
         e->joint.body = body_named(o, e->child);
@@ -293,29 +310,34 @@ void mhi_osim_joints(mhi_osim *o) {
     }
 }
 
+static void read_body(mhi_osim *o, xmlNode *n) {
+    const char *name = mhi_xml_name(o, n);
+    mhi_body_draft *draft = mhi_build_body(&o->b, name, NULL, mhi_xml_line(n));
+    if (draft == NULL) {
+        return;
+    }
+    if (mhi_xml_word(o, n, "mass") == NULL) {
+        mhi_build_warn(&o->b, mhi_xml_line(n), "body '%s' has no mass: as in OpenSim it is 0",
+                       name);
+    }
+    (void)mhi_xml_numbers(o, n, "mass", &draft->body.mass, 1);
+    (void)mhi_xml_numbers(o, n, "mass_center", draft->body.com, 3);
+    read_inertia(o, n, draft->body.inertia);
+    drop_inertia_without_mass(o, draft);
+    xmlNode *node = mhi_xml_first(mhi_xml_child(n, "Joint"));
+    if (node == NULL) {
+        node = mhi_xml_first(mhi_xml_child(n, "joint"));
+    }
+    if (node != NULL) {
+        joint_before_4(o, node, draft);
+    }
+}
+
 void mhi_osim_bodies(mhi_osim *o) {
-    for (xmlNode *n = mhi_xml_objects(o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
-        const char *name = mhi_xml_name(o, n);
-        if (!mhi_xml_is(n, "Body") || mhi_same_word(name, "ground")) {
-            continue;
-        }
-        mhi_body_draft *draft = mhi_build_body(&o->b, name, NULL, mhi_xml_line(n));
-        if (draft == NULL) {
-            return;
-        }
-        if (mhi_xml_word(o, n, "mass") == NULL) {
-            mhi_build_warn(&o->b, mhi_xml_line(n), "body '%s' has no mass: as in OpenSim it is 0",
-                           name);
-        }
-        (void)mhi_xml_numbers(o, n, "mass", &draft->body.mass, 1);
-        (void)mhi_xml_numbers(o, n, "mass_center", draft->body.com, 3);
-        read_inertia(o, n, draft->body.inertia);
-        xmlNode *node = mhi_xml_first(mhi_xml_child(n, "Joint"));
-        if (node == NULL) {
-            node = mhi_xml_first(mhi_xml_child(n, "joint"));
-        }
-        if (node != NULL) {
-            joint_before_4(o, node, draft);
+    mhi_osim_walk walk = mhi_osim_begin(o, "BodySet");
+    for (xmlNode *n = walk.node; n != NULL; n = mhi_osim_next(&walk)) {
+        if (mhi_xml_is(n, "Body") && !mhi_same_word(mhi_xml_name(o, n), "ground")) {
+            read_body(o, n);
         }
     }
 }

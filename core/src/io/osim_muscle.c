@@ -5,14 +5,8 @@
 #include <math.h>
 #include <string.h>
 
-static int32_t ends_with(const char *text, const char *ending) {
-    size_t n = strlen(text), k = strlen(ending);
-    return n >= k && strcmp(text + n - k, ending) == 0;
-}
-
 int32_t mhi_osim_is_muscle(const xmlNode *node) {
-    const char *type = (const char *)node->name;
-    return ends_with(type, "Muscle") || ends_with(type, "Muscle_Deprecated");
+    return mhi_xml_ends(node, "Muscle") || mhi_xml_ends(node, "Muscle_Deprecated");
 }
 
 typedef struct parameter {
@@ -120,18 +114,14 @@ static void read_acceleration(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
 }
 
 static void read_degroote(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
-    double width = 1;
-    (void)mhi_xml_numbers(o, node, "active_force_width_scale", &width, 1);
-    if (width != 1) {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node),
-                              "active_force_width_scale %g of muscle '%s': 1 taken, its active "
-                              "curve is narrower",
-                              width, m->name);
+    (void)mhi_xml_numbers(o, node, "active_force_width_scale", &m->active_shape, 1);
+    if (m->active_shape < 1) { /* OpenSim refuses it */
+        mhi_build_fail(&o->b, mhi_xml_line(node),
+                       "muscle '%s': active_force_width_scale %g needs to be at least 1", m->name,
+                       m->active_shape);
     }
     if (mhi_xml_flag(o, node, "ignore_passive_fiber_force")) {
-        mhi_build_unsupported(&o->b, mhi_xml_line(node),
-                              "ignore_passive_fiber_force of muscle '%s': its passive force acts",
-                              m->name);
+        m->passive_strain = INFINITY;
     }
 }
 
@@ -185,15 +175,22 @@ static void read_schutte(mhi_osim *o, xmlNode *node, mhe_muscle *m) {
     (void)mhi_xml_numbers(o, node, "activation1", &k1, 1);
     (void)mhi_xml_numbers(o, node, "activation2", &k2, 1);
     (void)mhi_xml_numbers(o, node, "damping", &damping, 1);
-    if (!(scale > 0 && k1 >= 0 && k2 > 0)) {
+    if (!(scale > 0 && k1 >= 0 && k2 >= 0)) {
         mhi_build_fail(&o->b, mhi_xml_line(node),
-                       "muscle '%s': time_scale %g, activation1 %g and activation2 %g need to be "
-                       "> 0",
+                       "muscle '%s': time_scale %g needs to be > 0, activation1 %g and activation2 "
+                       "%g at least 0",
                        m->name, scale, k1, k2);
         return;
     }
-    m->activation_time = scale / (k1 + k2);
-    m->deactivation_time = scale / k2;
+    if (k2 > 0) {
+        m->activation_time = scale / (k1 + k2);
+        m->deactivation_time = scale / k2;
+    } else { /* its activation would never fall, without k1 never change */
+        mhi_build_warn(&o->b, mhi_xml_line(node),
+                       "muscle '%s' has activation2 0, with which no activation ever falls: the "
+                       "muscle plugin's own times are taken",
+                       m->name);
+    }
     m->fiber_damping = damping;
     m->max_contraction_velocity = 1 / scale;
     read_file_curve(o, node, "active_force_length_curve", &m->active_force_length, m->name);

@@ -19,6 +19,9 @@ static void read_conditional(mhi_osim *o, xmlNode *node, const char *whose, mhe_
     const char *coordinate = coordinate_of(o, node, "coordinate");
     double range[2] = {0, 0};
     out->kind = MHE_POINT_CONDITIONAL;
+    if (coordinate == NULL) { /* before 2.0 */
+        coordinate = mhi_xml_word(o, node, "coordinates");
+    }
     if (coordinate == NULL) {
         mhi_build_fail(&o->b, mhi_xml_line(node), "%s has no coordinate", whose);
         return;

@@ -89,26 +89,43 @@ static void read_frames(mhi_osim *o, xmlNode *holder, const char *owner) {
     for (xmlNode *n = mhi_xml_first(holder); n != NULL; n = mhi_xml_next(n)) {
         const char *body;
         mhi_transform at;
-        if (mhi_xml_is(n, "PhysicalOffsetFrame") && mhi_xml_objects(n, "WrapObjectSet") != NULL) {
-            const char *path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, n));
-            if (path != NULL && mhi_osim_resolve(o, path, "", mhi_xml_line(n), &body, &at)) {
+        const char *path = NULL;
+        if (mhi_xml_is(n, "PhysicalOffsetFrame") || mhi_xml_is(n, "StationDefinedFrame")) {
+            path = mhi_arena_format(&o->b.arena, "%s/%s", owner, mhi_xml_name(o, n));
+        }
+        if (path == NULL) {
+            continue;
+        }
+        read_frames(o, mhi_xml_child(n, "components"), path); /* frames of frames */
+        if (mhi_xml_objects(n, "WrapObjectSet") != NULL) {
+            if (mhi_osim_resolve(o, path, "", mhi_xml_line(n), &body, &at)) {
                 read_set(o, n, body, &at);
             }
         }
     }
 }
 
+static const char *member_path(mhi_osim *o, const mhi_osim_walk *walk, const xmlNode *node) {
+    const char *path = mhi_arena_format(&o->b.arena, "%s/%s", walk->owner, mhi_xml_name(o, node));
+    return path != NULL ? path : "";
+}
+
 void mhi_osim_obstacles(mhi_osim *o) {
     const mhi_transform here = mhi_transform_identity();
     read_set(o, mhi_xml_child(o->model, "Ground"), NULL, &here);
     read_frames(o, mhi_xml_child(mhi_xml_child(o->model, "Ground"), "components"), "/ground");
-    for (xmlNode *n = mhi_xml_objects(o->model, "BodySet"); n != NULL; n = mhi_xml_next(n)) {
-        const char *owner = mhi_arena_format(&o->b.arena, "/bodyset/%s", mhi_xml_name(o, n));
-        read_set(o, n, mhi_xml_name(o, n), &here);
-        read_frames(o, mhi_xml_child(n, "components"), owner != NULL ? owner : "");
+    read_frames(o, mhi_xml_child(o->model, "components"), "");
+    mhi_osim_walk walk = mhi_osim_begin(o, "BodySet");
+    for (xmlNode *n = walk.node; n != NULL; n = mhi_osim_next(&walk)) {
+        if (mhi_xml_is(n, "Body")) {
+            read_set(o, n, mhi_xml_name(o, n), &here);
+            read_frames(o, mhi_xml_child(n, "components"), member_path(o, &walk, n));
+        }
     }
-    for (xmlNode *n = mhi_xml_objects(o->model, "JointSet"); n != NULL; n = mhi_xml_next(n)) {
-        const char *owner = mhi_arena_format(&o->b.arena, "/jointset/%s", mhi_xml_name(o, n));
-        read_frames(o, mhi_xml_child(n, "frames"), owner != NULL ? owner : "");
+    walk = mhi_osim_begin(o, "JointSet");
+    for (xmlNode *n = walk.node; n != NULL; n = mhi_osim_next(&walk)) {
+        if (mhi_xml_ends(n, "Joint")) {
+            read_frames(o, mhi_xml_child(n, "frames"), member_path(o, &walk, n));
+        }
     }
 }

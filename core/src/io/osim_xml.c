@@ -211,6 +211,48 @@ int32_t mhi_xml_one_of(const xmlNode *node, const char *const *names, size_t n) 
     return 0;
 }
 
+int32_t mhi_xml_ends(const xmlNode *node, const char *ending) {
+    const char *name = (const char *)node->name;
+    const size_t n = strlen(name), k = strlen(ending);
+    return n >= k && strcmp(name + n - k, ending) == 0;
+}
+
+static xmlNode *place_of(const mhi_osim *o, const char *set, int32_t place) {
+    return place == 0   ? mhi_xml_objects(o->model, set)
+           : place == 1 ? mhi_xml_first(mhi_xml_child(o->model, "components"))
+                        : mhi_xml_objects(o->model, "ComponentSet");
+}
+
+/* To the first element of the next place that has one. */
+static xmlNode *next_place(mhi_osim_walk *walk) {
+    while (walk->node == NULL && walk->place < 2) {
+        walk->place++;
+        walk->node = place_of(walk->o, walk->set, walk->place);
+        walk->owner = walk->place == 1 ? "" : "/componentset";
+    }
+    return walk->node;
+}
+
+mhi_osim_walk mhi_osim_begin(mhi_osim *o, const char *set) {
+    static const char *const owners[][2] = {{"BodySet", "/bodyset"},
+                                            {"JointSet", "/jointset"},
+                                            {"ConstraintSet", "/constraintset"},
+                                            {"ForceSet", "/forceset"}};
+    mhi_osim_walk walk = {.o = o, .set = set, .owner = "", .node = place_of(o, set, 0)};
+    for (size_t i = 0; i < sizeof owners / sizeof *owners; i++) {
+        if (strcmp(owners[i][0], set) == 0) {
+            walk.owner = owners[i][1];
+        }
+    }
+    (void)next_place(&walk);
+    return walk;
+}
+
+xmlNode *mhi_osim_next(mhi_osim_walk *walk) {
+    walk->node = mhi_xml_next(walk->node);
+    return next_place(walk);
+}
+
 xmlNode *mhi_xml_objects(xmlNode *parent, const char *set) {
     return mhi_xml_first(mhi_xml_child(mhi_xml_child(parent, set), "objects"));
 }

@@ -155,6 +155,34 @@ static void pushes_only_by_its_damping(void **state) {
     assert_true(pushing > 0); /* an idle muscle of paper2021 */
 }
 
+/* OpenSim's active_force_width_scale w and ignore_passive_fiber_force: with full activation at rest
+ * the force is that of the plain curve at 1 + (n - 1) / w, its passive part taken off. */
+static void active_curve_as_wide_as_the_file_says(void **state) {
+    (void)state;
+    const double l_opt = 0.1, slack = 0.2, width = 1.5;
+    mhe_muscle m = test_muscle(MHE_MUSCLE_DEGROOTE2016, 1000, l_opt, slack, 0);
+    m.passive_strain = INFINITY;
+    struct test_hill plain = test_hill(&m, 1, "curves: degroote2016");
+    m.active_shape = width;
+    struct test_hill wide = test_hill(&m, 1, "curves: degroote2016");
+    assert_true(plain.ops != NULL && wide.ops != NULL);
+    for (int i = 0; i < 30; i++) {
+        const double n = 0.4 + 0.05 * i, narrow = 1 + (n - 1) / width;
+        const double f = force_at(&wide, 1, slack + l_opt * n, 0);
+        assert_true(fabs(f - force_at(&plain, 1, slack + l_opt * narrow, 0)) < 1e-9);
+        assert_true(force_at(&wide, 0, slack + l_opt * n, 0) == 0); /* nothing passive */
+    }
+    plain.ops->destroy(plain.self);
+    wide.ops->destroy(wide.self);
+    /* a Thelen curve does not take it for its own shape */
+    struct test_hill thelen = test_hill(&m, 1, "curves: thelen2003");
+    m.active_shape = NAN;
+    struct test_hill unstated = test_hill(&m, 1, "curves: thelen2003");
+    assert_true(force_at(&thelen, 1, 0.27, 0) == force_at(&unstated, 1, 0.27, 0));
+    thelen.ops->destroy(thelen.self);
+    unstated.ops->destroy(unstated.self);
+}
+
 static int rate_of(void *data, const double *x, double *y) {
     const struct test_hill *hill = data;
     return hill->ops->diagonal_rate(hill->self, 0, x, x + 1, y, NULL, NULL, NULL);
@@ -349,6 +377,7 @@ static void refusals(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(force_derivatives),
+                                       cmocka_unit_test(active_curve_as_wide_as_the_file_says),
                                        cmocka_unit_test(derivatives_by_numbers),
                                        cmocka_unit_test(pushes_only_by_its_damping),
                                        cmocka_unit_test(activation_derivatives),
