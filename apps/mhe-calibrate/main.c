@@ -75,25 +75,26 @@ static const char *solver_setting(const mhi_plan *plan, int32_t ipopt, mhi_arena
                             (int)plan->max_iterations, fmax(1e-12, fmin(1e-4, plan->tolerance)));
 }
 
-/* The config with the solver that section calibrate asks for, and that of the start: the same start
- * whatever the solver is, since first activations are expected near those that it finds. */
+/* The config as it is, that with the solver that section calibrate asks for, and that of the start:
+ * the same start whatever the solver is, since first activations are expected near those that it
+ * finds. */
 static mhe_status read_run(const arguments *a, const mhe_host *host, mhi_registry *registry,
-                           mhi_run **run, mhi_run **start, mhe_error *err) {
+                           mhi_run **own, mhi_run **run, mhi_run **start, mhe_error *err) {
     mhi_plan plan;
     mhi_arena arena = {0};
     mhi_text model = {0};
     int32_t n = 0;
     const char **set = MHI_TAKE(&arena, const char *, a->set.n + 3);
-    mhe_status status = mhi_run_read(a->config, a->set.values, a->set.n, registry, run, err);
+    mhe_status status = mhi_run_read(a->config, a->set.values, a->set.n, registry, own, err);
     if (status == MHE_OK) {
-        status = mhi_plan_read(*run, registry, &plan, err);
+        status = mhi_plan_read(*own, registry, &plan, err);
     }
     if (status == MHE_OK && set == NULL) {
         status = mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     if (status == MHE_OK && plan.scale != NULL) {
         mhi_text out = {0};
-        status = out_folder(a, *run, &out, err);
+        status = out_folder(a, *own, &out, err);
         status = status == MHE_OK ? scaled_make(host, plan.scale, out.data, a->quiet, &model, err)
                                   : status;
         mhi_text_free(&out);
@@ -106,8 +107,6 @@ static mhe_status read_run(const arguments *a, const mhe_host *host, mhi_registr
             set[n++] = model.data;
         }
         set[n++] = solver_setting(&plan, plan.solver, &arena);
-        mhi_run_free(*run);
-        *run = NULL;
         status = mhi_run_read(a->config, set, n, registry, run, err);
         set[n - 1] = solver_setting(&plan, 0, &arena);
         set[n++] = START_COSTS;
@@ -144,6 +143,27 @@ static const char *file_of(const mhi_plan *plan, int32_t i) {
     return path == NULL ? "" : behind(path, same > 1 ? 2 : 1);
 }
 
+/* What is known of a recording: without EMG, or without a reference, nothing is to be compared. */
+static void tell_recording(const report_recording *r) {
+    const struct {
+        const char *what, *unit;
+        double before, after, scale;
+    } parts[] = {{"markers", " mm", r->before.marker, r->after.marker, 1e3},
+                 {"EMG", "", r->before.emg, r->after.emg, 1},
+                 {"forces", " N", r->before.force, r->after.force, 1}};
+    const char *between = ":";
+    (void)fprintf(stderr, "%s%s", r->name, r->held_out ? " (held out)" : "");
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        if (!isnan(parts[i].before) || !isnan(parts[i].after)) {
+            (void)fprintf(stderr, "%s %s %.3g -> %.3g%s", between, parts[i].what,
+                          parts[i].scale * parts[i].before, parts[i].scale * parts[i].after,
+                          parts[i].unit);
+            between = ",";
+        }
+    }
+    (void)fputc('\n', stderr);
+}
+
 /* Each recording with the config as it was and with that of the person. */
 static mhe_status compare(const arguments *a, const mhi_calibration *c, const char *person,
                           report_recording *list, mhe_error *err) {
@@ -158,11 +178,7 @@ static mhe_status compare(const arguments *a, const mhi_calibration *c, const ch
             status = held_out_measure(person, NULL, 0, r, c->host, &one->after, err);
         }
         if (status == MHE_OK && !a->quiet) {
-            (void)fprintf(
-                stderr, "%s%s: markers %.3g -> %.3g mm, EMG %.3g -> %.3g, forces %.3g -> %.3g N\n",
-                one->name, r->hold_out ? " (held out)" : "", 1e3 * one->before.marker,
-                1e3 * one->after.marker, one->before.emg, one->after.emg, one->before.force,
-                one->after.force);
+            tell_recording(one);
         }
     }
     return status;
@@ -241,11 +257,12 @@ static mhe_status tell(arguments *a, mhi_calibration *c, mhe_error *err) {
 
 static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *registry,
                             mhe_error *err) {
-    mhi_run *run = NULL, *start = NULL;
+    mhi_run *own = NULL, *run = NULL, *start = NULL;
     mhi_calibration c = {.progress = NULL};
-    mhe_status status = read_run(a, host, registry, &run, &start, err);
+    mhe_status status = read_run(a, host, registry, &own, &run, &start, err);
     if (status == MHE_OK) {
         status = mhi_calibration_open(run, start, registry, host, &c, err);
+        c.persons_solver = &own->solver;
         c.progress = show;
         c.data = a;
     }
@@ -256,6 +273,7 @@ static mhe_status calibrate(arguments *a, const mhe_host *host, mhi_registry *re
         status = tell(a, &c, err);
     }
     mhi_calibration_close(&c);
+    mhi_run_free(own);
     mhi_run_free(run);
     mhi_run_free(start);
     return status;

@@ -145,6 +145,20 @@ static mhe_status check_conditions(study *s, mhe_error *err) {
                                : MHE_OK;
 }
 
+/* What would be found after the last trial, or the first. */
+static mhe_status check_ends(const study *s, mhe_error *err) {
+    const mhi_node *root = mhi_tree_root(s->tree), *report = mhi_node_find(root, "report");
+    if (report != NULL && report->kind != MHI_MAPPING && !mhi_node_is_null(report)) {
+        return mhi_fail_at(err, MHE_E_CONFIG, s->tree, report,
+                           "report: a mapping {boxes: [...], anova: [...], pairs: [...], ...}");
+    }
+    if (s->keys.program != NULL && access(s->keys.program, R_OK) != 0) {
+        return mhi_fail_at(err, MHE_E_CONFIG, s->tree, mhi_node_find(root, "program"),
+                           "program: %s: %s", s->keys.program, strerror(errno));
+    }
+    return MHE_OK;
+}
+
 mhe_status study_read(const char *path, const char *const *set, int32_t n_set, study *s,
                       mhe_error *err) {
     *s = (study){.override = set, .n_override = n_set};
@@ -162,6 +176,7 @@ mhe_status study_read(const char *path, const char *const *set, int32_t n_set, s
     }
     status = status == MHE_OK ? study_read_factors(s, err) : status;
     status = status == MHE_OK ? study_read_grids(s, err) : status;
+    status = status == MHE_OK ? check_ends(s, err) : status;
     return status == MHE_OK ? check_conditions(s, err) : status;
 }
 

@@ -1,14 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* check_muscle.c: four made-up muscles at points away from the kinks of common curves. */
-#include "kit.h"
+#include "check_muscle.h"
 
 #include <math.h>
-#include <mhe/muscle.h>
-#include <stddef.h>
 #include <string.h>
-
-#define N_M 4
-#define MAX_S (MHE_MUSCLE_MAX_STATES * N_M)
 
 static mhe_muscle made_up(const char *name, int32_t type, double force, double fiber, double slack,
                           double pennation) {
@@ -21,30 +16,18 @@ static mhe_muscle made_up(const char *name, int32_t type, double force, double f
     return m;
 }
 
-typedef struct muscle_case {
-    const mhe_muscle_ops *ops;
-    void *self;
-    mhe_muscle_layout layout;
-    int32_t n_s; /* states of all muscles: layout.n_states N_M */
-    mhi_probe probe;
-} muscle_case;
-
-enum { EXCITATION, STATE, LENGTH, VELOCITY, N_IN };
-enum { FORCE, FORCE_S, FORCE_L, FORCE_W, RATE, RATE_E, RATE_S, RATE_L, RATE_W, N_OUT };
-
 static int present(const muscle_case *c, int32_t at) {
     return c->layout.present == NULL || c->layout.present[at];
 }
 
-/* Entries that no muscle has mean nothing: whatever the plugin left there becomes 0. */
-static void blank(const muscle_case *c, double *values) {
+void mhi_muscle_blank(const muscle_case *c, double *values) {
     for (int32_t at = 0; values != NULL && at < c->n_s; at++) {
         values[at] = present(c, at) ? values[at] : 0;
     }
 }
 
-static mhe_status call_evaluate(void *data, void *worker, void *scratch, const double *const *in,
-                                double *const *out, mhe_error *err) {
+mhe_status mhi_muscle_evaluate(void *data, void *worker, void *scratch, const double *const *in,
+                               double *const *out, mhe_error *err) {
     const muscle_case *c = data;
     const int32_t n = c->layout.n_states;
     (void)worker, (void)scratch;
@@ -62,7 +45,7 @@ static mhe_status call_evaluate(void *data, void *worker, void *scratch, const d
     const mhe_status status = c->ops->evaluate(c->self, &at, &values, err);
     double *const of_states[] = {out[FORCE_S], out[RATE], out[RATE_E], out[RATE_L], out[RATE_W]};
     for (size_t i = 0; i < sizeof of_states / sizeof of_states[0]; i++) {
-        blank(c, of_states[i]);
+        mhi_muscle_blank(c, of_states[i]);
     }
     for (int32_t k = 0; k < n * c->n_s && out[RATE_S] != NULL; k++) {
         const int32_t row = k / N_M / n, column = k / N_M % n, i = k % N_M;
@@ -137,85 +120,6 @@ static void check_derivatives(mhi_kit *kit, const muscle_case *c, const double *
                      "rates by velocity against differences");
 }
 
-/* A parameter is a number of the description: the plugin made anew with another one must differ as
- * force_p and rate_p say. */
-static const struct {
-    const char *name;
-    size_t offset;
-} parameters[] = {{"max_isometric_force", offsetof(mhe_muscle, max_isometric_force)},
-                  {"optimal_fiber_length", offsetof(mhe_muscle, optimal_fiber_length)},
-                  {"tendon_slack_length", offsetof(mhe_muscle, tendon_slack_length)},
-                  {"pennation_angle", offsetof(mhe_muscle, pennation_angle)},
-                  {"max_contraction_velocity", offsetof(mhe_muscle, max_contraction_velocity)},
-                  {"activation_time", offsetof(mhe_muscle, activation_time)},
-                  {"deactivation_time", offsetof(mhe_muscle, deactivation_time)}};
-
-typedef struct parameter_case {
-    mhi_kit *kit;
-    const muscle_case *c;
-    const mhe_muscle *muscles;
-    const double *const *in;
-    size_t offset;
-} parameter_case;
-
-/* y = [force; rates] at parameter values x [N_M] */
-static int with_parameters(void *data, const double *x, double *y) {
-    const parameter_case *p = data;
-    muscle_case made = *p->c;
-    mhe_muscle muscles[N_M];
-    memcpy(muscles, p->muscles, sizeof muscles);
-    for (int i = 0; i < N_M; i++) {
-        memcpy((char *)&muscles[i] + p->offset, &x[i], sizeof x[i]);
-    }
-    if (made.ops->create(&p->kit->host, muscles, N_M, p->kit->config, &made.self, NULL) != MHE_OK) {
-        return -1;
-    }
-    double *const out[N_OUT] = {[FORCE] = y, [RATE] = y + N_M};
-    const mhe_status status = call_evaluate(&made, NULL, NULL, p->in, out, NULL);
-    made.ops->destroy(made.self);
-    return status != MHE_OK;
-}
-
-static void check_parameters(mhi_kit *kit, const muscle_case *c, const mhe_muscle *muscles,
-                             const double *const *in) {
-    const int32_t n_p = c->layout.n_parameters, rows = N_M + c->n_s;
-    double *force_p = MHI_KIT_TAKE(kit, double, n_p *N_M);
-    double *rate_p = MHI_KIT_TAKE(kit, double, n_p * c->n_s);
-    const mhe_muscle_point at = {sizeof at, in[EXCITATION], in[STATE], in[LENGTH], in[VELOCITY]};
-    const mhe_muscle_values out = {.size = sizeof out, .force_p = force_p, .rate_p = rate_p};
-    if (n_p > 0 && c->ops->evaluate(c->self, &at, &out, NULL) != MHE_OK) {
-        mhi_kit_fail(kit, "derivatives by parameters alone", "evaluate() fails");
-        return;
-    }
-    for (int32_t p = 0; p < n_p; p++) {
-        size_t k = 0;
-        while (k < sizeof parameters / sizeof parameters[0] &&
-               strcmp(parameters[k].name, c->layout.parameter_names[p]) != 0) {
-            k++;
-        }
-        if (k == sizeof parameters / sizeof parameters[0]) {
-            mhi_kit_skip(kit, "derivatives by a parameter", "'%s' is no number of a description",
-                         c->layout.parameter_names[p]);
-            continue;
-        }
-        parameter_case data = {kit, c, muscles, in, parameters[k].offset};
-        double x[N_M], *jacobian = MHI_KIT_TAKE(kit, double, rows *N_M);
-        blank(c, rate_p + p * c->n_s);
-        for (int m = 0; m < N_M; m++) {
-            memcpy(&x[m], (const char *)&muscles[m] + data.offset, sizeof x[m]);
-            jacobian[m * N_M + m] = force_p[p * N_M + m];
-            for (int32_t s = 0; s < c->layout.n_states; s++) {
-                jacobian[(N_M + s * N_M + m) * N_M + m] = rate_p[p * c->n_s + s * N_M + m];
-            }
-        }
-        (void)mhi_kit_limit(kit,
-                            mhi_arena_format(&kit->arena, "derivatives by %s against differences",
-                                             parameters[k].name),
-                            mhi_jacobian_error(kit, with_parameters, &data, x, N_M, rows, jacobian),
-                            MHI_JACOBIAN_LIMIT);
-    }
-}
-
 /* ---- single outputs ---- */
 
 static void check_alone(mhi_kit *kit, const muscle_case *c, const double *const *in,
@@ -277,7 +181,7 @@ static void check_equilibrium(mhi_kit *kit, const muscle_case *c, const double *
     }
     mhe_error err = {0};
     if (c->ops->equilibrium(c->self, a, in[LENGTH], still, state, &err) != MHE_OK ||
-        call_evaluate((void *)c, NULL, NULL, at, out, &err) != MHE_OK) {
+        mhi_muscle_evaluate((void *)c, NULL, NULL, at, out, &err) != MHE_OK) {
         mhi_kit_fail(kit, "equilibrium", "%s", err.text);
         return;
     }
@@ -355,7 +259,7 @@ static int approaches(muscle_case *c, const double *const *in, double *const *ou
     memcpy(s, in[STATE], sizeof *s * (size_t)c->n_s);
     const double *const at[] = {in[EXCITATION], s, in[LENGTH], in[VELOCITY]};
     for (int step = 0; step < 200; step++) {
-        if (call_evaluate(c, NULL, NULL, at, out, err) != MHE_OK) {
+        if (mhi_muscle_evaluate(c, NULL, NULL, at, out, err) != MHE_OK) {
             return 0;
         }
         for (int32_t i = 0; i < N_M; i++) {
@@ -392,7 +296,7 @@ static void check_points(mhi_kit *kit, muscle_case *c, const mhe_muscle *muscles
         mhe_error err = {0};
         mhe_status status = point_of_turn(c, muscles, turn, e, s, l, w, &err);
         if (status == MHE_OK) {
-            status = call_evaluate(c, NULL, NULL, in, out, &err);
+            status = mhi_muscle_evaluate(c, NULL, NULL, in, out, &err);
         }
         if (status != MHE_OK) {
             mhi_kit_fail(kit, "evaluate", "status %d: %s", (int)status, err.text);
@@ -404,7 +308,7 @@ static void check_points(mhi_kit *kit, muscle_case *c, const mhe_muscle *muscles
         check_derivatives(kit, c, in, out);
         check_diagonal(kit, c, in, out);
         check_equilibrium(kit, c, in);
-        check_parameters(kit, c, muscles, in);
+        mhi_check_muscle_parameters(kit, c, muscles, in);
         if (turn == N_M - 1) {
             check_alone(kit, c, in, out);
         }
@@ -433,7 +337,7 @@ static void make_probe(muscle_case *c) {
                                    [RATE_L] = {.n = n_s},
                                    [RATE_W] = {.n = n_s}},
                            .data = c,
-                           .call = call_evaluate};
+                           .call = mhi_muscle_evaluate};
 }
 
 void mhi_check_muscle(mhi_kit *kit) {

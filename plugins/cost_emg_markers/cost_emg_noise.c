@@ -11,9 +11,9 @@
 #include <stdlib.h>
 
 struct emg_noise_config { /* standard deviations */
-    double markers, markers_misfit, emg_spread, emg_value, emg_floor;
+    double markers, markers_misfit, markers_offset, emg_spread, emg_value, emg_floor;
     mhe_text_list tracked;
-    double untracked, residual_torque, qdot;
+    double untracked, residual_torque, qdot, rates;
 };
 
 static const mhe_option emg_noise_options[] = {
@@ -23,6 +23,10 @@ static const mhe_option emg_noise_options[] = {
         struct emg_noise_config, markers_misfit, 0.5, 0, 10, "1",
         "The same as a share of how far all markers were from the estimates so far (RMS of "
         "a coordinate); the larger counts."),
+    MHE_OPT_REAL(
+        struct emg_noise_config, markers_offset, 2, 0, 10, "1",
+        "Where joint velocities are measured (data.rates), in the place of markers_misfit: a share "
+        "of how far markers were from the postures nearest to them (RMS of a coordinate)."),
     MHE_OPT_REAL(
         struct emg_noise_config, emg_spread, 0.5, 0, 10, "1",
         "Standard deviation of EMG as a share of how much its channel varies (its standard "
@@ -38,6 +42,8 @@ static const mhe_option emg_noise_options[] = {
                  "Standard deviation of residual torques, where the problem has them."),
     MHE_OPT_REAL(struct emg_noise_config, qdot, 30, 1e-6, 1e6, "rad/s",
                  "Standard deviation about 0 of joint velocities."),
+    MHE_OPT_REAL(struct emg_noise_config, rates, 0.05, 1e-6, 1e6, "rad/s",
+                 "Standard deviation of joint velocities where they are measured (data.rates)."),
 };
 
 /* What a row of y is. */
@@ -45,7 +51,7 @@ enum { OF_MARKER, OF_EMG, OF_NO_EMG, OF_TORQUE, OF_SPEED };
 
 struct emg_noise {
     const struct emg_noise_config *config;
-    int32_t n_signals, signals[4], n;
+    int32_t n_signals, signals[4], n, first_speed;
     int32_t *kind; /* [n] */
 };
 
@@ -98,6 +104,7 @@ static mhe_status emg_noise_create(const mhe_host *host, const mhe_problem *prob
         t->signals[t->n_signals++] = problem->find_signal(problem, control, NULL, NULL);
         t->n += problem->n_muscles;
         emg_noise_add(t, problem, "residual_torque", OF_TORQUE);
+        t->first_speed = t->n;
         emg_noise_add(t, problem, "qdot", OF_SPEED);
         *self = t;
     } else {
@@ -124,6 +131,18 @@ static double emg_noise_of(const struct emg_noise_config *c, double measured, do
     return fmax(fmax(c->emg_floor, c->emg_value * fabs(measured)), c->emg_spread * spread);
 }
 
+/* Of a marker's coordinate. What markers are off in their segments is the same at all nodes: the
+ * window tells posture but once by it, however many nodes there are, while velocities are free of
+ * it. So where velocities are measured, positions are held less. */
+static double marker_sigma(const struct emg_noise *t, const mhe_stage *s, int32_t i) {
+    const struct emg_noise_config *c = t->config;
+    if (s->y_spread == NULL || isnan(s->y_spread[i])) {
+        return c->markers;
+    }
+    const int32_t moves = t->first_speed < t->n && !isnan(s->y_spread[t->first_speed]);
+    return fmax(c->markers, (moves ? c->markers_offset : c->markers_misfit) * s->y_spread[i]);
+}
+
 /* Sigma of a row; `*target` is what it is compared with. */
 static double emg_noise_sigma(const struct emg_noise *t, const mhe_stage *s, int32_t i,
                               double *target) {
@@ -133,9 +152,7 @@ static double emg_noise_sigma(const struct emg_noise *t, const mhe_stage *s, int
     switch (t->kind[i]) {
     case OF_MARKER:
         *target = measured;
-        return s->y_spread == NULL || isnan(s->y_spread[i])
-                   ? c->markers
-                   : fmax(c->markers, c->markers_misfit * s->y_spread[i]);
+        return marker_sigma(t, s, i);
     case OF_EMG:
         if (!isnan(measured)) {
             *target = measured;
@@ -147,6 +164,10 @@ static double emg_noise_sigma(const struct emg_noise *t, const mhe_stage *s, int
     case OF_TORQUE:
         return c->residual_torque;
     default:
+        if (!isnan(measured)) {
+            *target = measured;
+            return c->rates;
+        }
         return c->qdot;
     }
 }

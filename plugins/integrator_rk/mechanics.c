@@ -36,8 +36,7 @@
 /* Below this a step has not moved: its derivatives are off by as much. */
 #define RK_UNMOVED 1e-9
 
-/* Stage position and velocity from the stage accelerations. */
-static void rk_stage(struct rk_context *c, double h, int32_t j) {
+void rk_stage(struct rk_context *c, double h, int32_t j) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q, s = t->stages;
     int32_t known = t->is_explicit ? j : s;
@@ -115,9 +114,7 @@ static mhe_status rk_evaluate_all(struct rk_context *c, const double *r, double 
     return status;
 }
 
-/* LU of I - h^2 (A A) f_q - h A f_v; `only` is the stage whose derivatives serve all, -1: each its
- * own. */
-static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *err) {
+mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *err) {
     const struct rk_tableau *t = &c->rk->mechanics;
     int32_t n_q = c->rk->system->n_q, s = t->stages, n = s * n_q;
     for (int32_t j = 0; j < s; j++) {
@@ -140,9 +137,7 @@ static mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_er
                : mhe_fail(err, MHE_RETRY, "a stage system over %g s has no solution", h);
 }
 
-/* Adds the solution of J x = residual to K (and moves Z, behind rk_states_before). Returns its size
- * as a velocity, in units of 1 + |v|; NaN where it has none. */
-static double rk_correct(struct rk_context *c, double h) {
+double rk_correct(struct rk_context *c, double h) {
     int32_t n_q = c->rk->system->n_q, n = c->rk->mechanics.stages * n_q;
     int32_t n_z = c->rk->system->n_z;
     rk_lu_solve(c->at->lu, n, c->at->pivots, c->residual);
@@ -162,116 +157,6 @@ static double rk_correct(struct rk_context *c, double h) {
     }
     double change = h * largest / (1 + speed);
     return states > change ? states : change;
-}
-
-/* Stage accelerations of the system linearised at the start of the step, from one evaluation there;
- * leaves its Jacobian factored. */
-static mhe_status rk_predict(struct rk_context *c, const double *r, double h, mhe_error *err) {
-    const struct rk_tableau *t = &c->rk->mechanics;
-    const mhe_system *system = c->rk->system;
-    int32_t n_q = system->n_q, n_m = system->n_m;
-    const mhe_acceleration out = {.size = sizeof out,
-                                  .vdot = c->f,
-                                  .vdot_q = c->at->f_q,
-                                  .vdot_v = c->at->f_v,
-                                  .vdot_a = c->at->f_a};
-    mhe_status status = rk_accelerate(c, c->q, c->v, c->a_start, NULL, r, &out, err);
-    if (status == MHE_OK) {
-        rk_keep_start(c);
-        status = rk_factor(c, h, 0, err);
-    }
-    if (status != MHE_OK) {
-        return status;
-    }
-    for (int32_t j = 0; j < t->stages; j++) {
-        memcpy(c->K + j * n_q, c->f, sizeof(double) * (size_t)n_q);
-    }
-    for (int32_t j = 0; j < t->stages; j++) {
-        const double *a = c->stage_a + j * n_m;
-        rk_stage(c, h, j);
-        for (int32_t i = 0; i < n_q; i++) {
-            double sum = 0;
-            for (int32_t m = 0; m < n_q; m++) {
-                sum += c->at->f_q[i * n_q + m] * (c->stage_q[m] - c->q[m]) +
-                       c->at->f_v[i * n_q + m] * (c->stage_v[m] - c->v[m]);
-            }
-            for (int32_t m = 0; m < n_m; m++) {
-                sum += c->at->f_a[i * n_m + m] * (a[m] - c->a_start[m]);
-            }
-            c->residual[j * n_q + i] = sum;
-        }
-    }
-    (void)rk_correct(c, h);
-    return MHE_OK;
-}
-
-/* With states z: the acceleration at the start for all stages, and z itself. */
-static mhe_status rk_predict_states(struct rk_context *c, const double *r, mhe_error *err) {
-    int32_t n_q = c->rk->system->n_q, n_z = c->rk->system->n_z;
-    const mhe_acceleration out = {.size = sizeof out, .vdot = c->f, .zdot = c->H};
-    mhe_status status = rk_accelerate(c, c->q, c->v, c->a_start, c->z, r, &out, err);
-    for (int32_t j = 0; j < c->rk->mechanics.stages && status == MHE_OK; j++) {
-        memcpy(c->K + j * n_q, c->f, sizeof(double) * (size_t)n_q);
-        memcpy(c->Z + j * n_z, c->z, sizeof(double) * (size_t)n_z);
-    }
-    return status;
-}
-
-/* Stage accelerations from those of the last step of this length that was linearised here: to first
- * order in what its data have changed by. Returns the size of the move, NaN: nothing is known. */
-static double rk_recall(struct rk_context *c, const double *r, double h) {
-    const struct rk_tableau *t = &c->rk->mechanics;
-    const mhe_system *system = c->rk->system;
-    const struct rk_slot *at = &c->kept;
-    int32_t n_q = system->n_q, n_m = system->n_m, n_r = system->n_r, n = t->stages * n_q;
-    if (!rk_memory_slot(c, &c->kept) || *at->step != h) {
-        return NAN;
-    }
-    for (int32_t k = 0; k < n; k++) {
-        int32_t j = k / n_q;
-        const double *f_q = at->f_q + k * n_q, *f_v = at->f_v + k * n_q;
-        const double *f_a = at->f_a + k * n_m, *f_r = at->f_r + k * n_r;
-        const double *a = c->stage_a + j * n_m, *a_then = at->stage_a + j * n_m;
-        double sum = 0;
-        for (int32_t m = 0; m < n_q; m++) {
-            double dv = c->v[m] - at->v[m];
-            sum += f_q[m] * (c->q[m] - at->q[m] + h * t->c[j] * dv) + f_v[m] * dv;
-        }
-        for (int32_t m = 0; m < n_m; m++) {
-            sum += f_a[m] * (a[m] - a_then[m]);
-        }
-        for (int32_t m = 0; m < n_r; m++) {
-            sum += f_r[m] * (r[m] - at->r[m]);
-        }
-        c->residual[k] = sum;
-    }
-    c->at = &c->kept;
-    if (system->n_z > 0) {
-        rk_states_recall(c, h);
-    }
-    memcpy(c->K, at->K, sizeof(double) * (size_t)n);
-    return rk_correct(c, h);
-}
-
-/* Keeps the step just linearised. */
-static void rk_keep(const struct rk_context *c, const double *r, double h) {
-    const mhe_system *system = c->rk->system;
-    const struct rk_slot *at = &c->kept;
-    int32_t n_q = system->n_q, s = c->rk->mechanics.stages;
-    memcpy(at->q, c->q, sizeof(double) * (size_t)n_q);
-    memcpy(at->v, c->v, sizeof(double) * (size_t)n_q);
-    for (int32_t i = 0; i < system->n_r; i++) {
-        at->r[i] = r[i];
-    }
-    for (int32_t i = 0; i < system->n_w; i++) {
-        at->w[i] = c->w[i];
-    }
-    memcpy(at->stage_a, c->stage_a, sizeof(double) * (size_t)(s * system->n_m));
-    memcpy(at->K, c->K, sizeof(double) * (size_t)(s * n_q));
-    if (system->n_z > 0) {
-        rk_states_keep(c);
-    }
-    *at->step = h;
 }
 
 /* One iteration, with a new Jacobian or the one in place; `change` is the size of the correction.

@@ -182,6 +182,27 @@ mhe_status rk_accelerate(const struct rk_context *c, const double *q, const doub
                          const double *a, const double *z, const double *r,
                          const mhe_acceleration *out, mhe_error *err);
 
+/* Parts of mechanics.c that start.c uses: position and velocity of stage j -> c->stage_q, stage_v;
+ * LU of I - h^2 (A A) f_q - h A f_v, where `only` is the stage whose derivatives serve all, -1:
+ * each its own; and the solution of J x = residual added to K (and Z, behind rk_states_before): its
+ * size as a velocity, in units of 1 + |v|, NaN where it has none. [hot] */
+void rk_stage(struct rk_context *c, double h, int32_t j);
+mhe_status rk_factor(struct rk_context *c, double h, int32_t only, mhe_error *err);
+double rk_correct(struct rk_context *c, double h);
+
+/* Where the iterations of a step begin (start.c). [hot] */
+
+/* Stage accelerations of the system linearised at the start of the step, from one evaluation there;
+ * leaves its Jacobian factored. */
+mhe_status rk_predict(struct rk_context *c, const double *r, double h, mhe_error *err);
+/* With states z: the acceleration at the start for all stages, and z itself. */
+mhe_status rk_predict_states(struct rk_context *c, const double *r, mhe_error *err);
+/* Stage accelerations from those of the last step of this length that was linearised here: to first
+ * order in what its data have changed by. Returns the size of the move, NaN: nothing is known. */
+double rk_recall(struct rk_context *c, const double *r, double h);
+/* Keeps the step just linearised. */
+void rk_keep(const struct rk_context *c, const double *r, double h);
+
 /* Right after the evaluation at the start of a step (f, f_a of stage 0): keeps f at the first
  * probe. [hot] */
 void rk_keep_start(struct rk_context *c);

@@ -132,8 +132,8 @@ static void hill_tell_sets(const mhe_host *host, const mhe_muscle *muscles, int3
         }
         size_t used = strlen(line);
         if (count > 0) {
-            (void)snprintf(line + used, sizeof line - used, " %s for %d", hill_curve_sets[k]->name,
-                           count);
+            (void)snprintf(line + used, sizeof line - used, "%s %s for %d",
+                           line[used - 1] == ':' ? "" : ",", hill_curve_sets[k]->name, count);
         }
     }
     host->log(host, MHE_LOG_INFO, line);

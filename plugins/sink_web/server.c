@@ -281,8 +281,11 @@ static mhe_status listen_on(web *w, mhe_error *err) {
     }
     w->context = lws_create_context(&info);
     if (w->context == NULL) {
-        return mhe_fail(err, MHE_E_IO, "%s, port %d: cannot be listened on; is it in use?",
-                        w->config.address, (int)w->config.port);
+        return mhe_fail(
+            err, MHE_E_IO,
+            "%s, port %d: cannot be listened on; is it in use? Is the address one of this "
+            "machine?",
+            w->config.address, (int)w->config.port);
     }
     char line[256];
     const int everywhere = strcmp(address, "0.0.0.0") == 0 || strcmp(address, "::") == 0;

@@ -116,6 +116,8 @@ def test_finds():
     assert abs(written / was / float(rows["max_isometric_force of BRA"]["after"]) - 1) < 1e-5
     page = open("out/report.html").read()
     assert "emg_gain of Deltoid2" in page and "held out" in page
+    with open("out/calibrated.yaml") as file:
+        assert "preset: balanced" in file.read()  # the solver of the config, not what the whole recordings are solved with
     done = run(os.path.join(os.path.dirname(CALIBRATE), "mhe-run"), "--check", "out/calibrated.yaml")
     assert done.returncode == 0, done.stderr
 
@@ -426,6 +428,30 @@ def test_channels():
     assert re.search(r"EMG of BRD reaches 1.20 times its MVC.*its emg_gain became", done.stderr), done.stderr
 
 
+def test_marker_weights():
+    """A marker of weight 0 is as good as one that was never seen."""
+    for kind in ("off", "gone"):
+        for motion in "ABC":
+            with open(motion + "/markers.trc") as file:
+                lines = file.read().split("\n")
+            head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+            for i in range(head, len(lines)):
+                cells = lines[i].split("\t")
+                for j in range(3 * 7 + 2, min(3 * 8 + 2, len(cells))):  # STYLu
+                    cells[j] = "%.6f" % (float(cells[j]) + 15) if kind == "off" else ""
+                lines[i] = "\t".join(cells)
+            write("%s_%s.trc" % (motion, kind), "\n".join(lines))
+    found = []
+    for kind, weights in (("off", "marker_weights: {STYLu: 0}"), ("gone", "marker_weights: {}"), ("off", "marker_weights: {}")):
+        write("weights.yaml", re.sub("([ABC])/markers", r"\1_" + kind, CONFIG).replace("calibrate:", "data: {%s}\ncalibrate:" % weights))
+        done = run(CALIBRATE, "weights.yaml", "--out", "weights", "--quiet", "--set", "calibrate.tolerance=1e-12")
+        assert done.returncode == 0, done.stderr
+        with open("weights/calibration.json") as file:
+            found.append([one["after"] for one in json.load(file)["parameters"]])
+    off = [max(abs(a - b) for a, b in zip(found[0], other)) for other in found[1:]]
+    assert off[0] < 1e-4 and off[1] > 1e-2, off
+
+
 def test_another_person():
     """5 % larger all over: too little to be refused by the markers' distances, but no model fits both."""
     with open("B/markers.trc") as file:
@@ -490,6 +516,7 @@ def main():
         test_solvers_agree()
         test_told()
         test_channels()
+        test_marker_weights()
         test_another_person()
         test_wrong_input()
 

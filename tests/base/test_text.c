@@ -11,6 +11,8 @@ static void nearest_name(void **state) {
     assert_string_equal(mhi_nearest("tolerence", names, 3), "tolerance");
     assert_string_equal(mhi_nearest("Max_Iteration", names, 3), "max_iterations");
     assert_null(mhi_nearest("zzzzzzzzzz", names, 3));
+    assert_string_equal(mhi_nearest("tol", names, 3), "tolerance"); /* a name half written */
+    assert_null(mhi_nearest("widows on", names, 3)); /* half of the letters fit by chance */
     char out[96];
     assert_string_equal(mhi_suggest(out, sizeof out, "windw", names, 3),
                         " (did you mean 'window'?)");

@@ -176,6 +176,14 @@ static void bad_electrodes_and_formats(void **state) {
                               "    - {name: a, muscles: x}\n    - {name: a, muscles: y}\n",
                    ":11: emg.channels: channel 'a' is there twice; one entry lists all of its "
                    "muscles");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
+                              "    - {name: a, muscles: x, delay: -0.02}\n",
+                   ":10: emg.channels: channel 'a': 'delay' is -0.02 s; EMG comes before the "
+                   "activation, so at least 0 (or -1: that of the section)");
+    assert_refused(BASE COSTS "data: {emg: e.sto}\n"
+                              "emg: {delay: -0.5, channels: [{name: a, muscles: x}]}\n",
+                   ":8: emg: 'delay' is -0.5 s; EMG comes before the activation, so at least 0 (or "
+                   "-1: what is usual)");
     assert_refused(BASE COSTS "emg:\n  channels:\n    - {name: a, muscles: x}\n",
                    ":7: emg: there are channels, but data.emg names no file");
     assert_refused(BASE COSTS "data: {emg: e.sto}\n"

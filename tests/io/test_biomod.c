@@ -259,8 +259,10 @@ static void mistakes_are_named_with_their_line(void **state) {
     const struct {
         const char *text, *message;
     } cases[] = {
-        {"", "m:1: a .bioMod file begins with 'version 1' to 'version 4'"},
-        {"version 9\n", "m:1: a .bioMod file begins with 'version 1' to 'version 4'"},
+        {"",
+         "m:1: neither an .osim (XML) nor a .bioMod, which begins with 'version 1' to 'version 4'"},
+        {"version 9\n",
+         "m:1: neither an .osim (XML) nor a .bioMod, which begins with 'version 1' to 'version 4'"},
         {"version 3\nsegment A\n mass -1\nendsegment\n",
          "m:2: body 'A' has a negative mass (-1 kg)"},
         {"version 3\nsegment A\n mass two\nendsegment\n",

@@ -268,6 +268,15 @@ static void unreadable_files(void **state) {
     mhe_error err = {0};
     assert_int_equal(mhi_sto_read("/nowhere/x.sto", &table, &err), MHE_E_INPUT);
     assert_non_null(strstr(err.text, "/nowhere/x.sto: cannot be opened: No such file"));
+    const char *there = MHE_TEST_BINARY_DIR "/tests/sto_recording.sto";
+    FILE *stream = fopen(there, "wb");
+    assert_non_null(stream);
+    (void)fclose(stream);
+    assert_int_equal(mhi_sto_read(MHE_TEST_BINARY_DIR "/tests/sto_recordnig.sto", &table, &err),
+                     MHE_E_INPUT);
+    (void)remove(there);
+    assert_non_null(strstr(err.text, "No such file or directory (did you mean "
+                                     "'sto_recording.sto'?)"));
     assert_int_equal(mhi_sto_read("/", &table, &err), MHE_E_INPUT);
     assert_non_null(strstr(err.text, "is a folder"));
     assert_null(table);

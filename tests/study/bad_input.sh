@@ -80,6 +80,10 @@ edit 's/{none: 0, low: 1}/[]/'
 expect no-values "'values' is a list"
 edit 's/^keep_forces.*/keep_forces: [{emg_noise: mid}]/'
 expect unknown-kept "factor 'emg_noise' has no value 'mid'"
+edit 's/^keep_forces.*/report: 5/'
+expect report-of-nothing 'small.yaml:14: report: a mapping'
+edit 's/^keep_forces.*/program: nowhere.py/'
+expect missing-program 'nowhere.py: No such file or directory' run --trust --check small.yaml
 expect bad-set "'trials' must lie in" run small.yaml --out result --set trials=0
 printf 'config: [unclosed\n' > small.yaml
 expect not-yaml 'small.yaml:'

@@ -108,10 +108,12 @@ typedef struct mhe_stage {
     const double *y_ref; /* [ny], NaN where no target is known; of MHE_AT_PREVIOUS: the target that
                           * the node before had */
     void *scratch;       /* [scratch_bytes], 64-byte aligned, this thread's own */
-    const double *y_spread; /* [ny] of EMG the standard deviation of an entry's targets since the
-                             * start, with what it may be while little was seen (0.1, of which e^-t
-                             * is left after t half seconds); of markers how far all were from the
-                             * estimates (RMS of a coordinate, m); NaN: not known. May be NULL */
+    const double *y_spread; /* [ny] of EMG and of measured joint velocities the standard deviation
+                             * of an entry's targets since the start, with what it may be while
+                             * little was seen (0.1, with data.rates 0.05, of which e^-t is left
+                             * after t half seconds); of markers how far all were from the estimates
+                             * (RMS of a coordinate, m), with data.rates from the postures nearest
+                             * to them; NaN: not known. May be NULL */
 } mhe_stage;
 
 /* Is an entry the one of that name, or one of its axes ("STER.x" of "STER")? [any] */

@@ -46,10 +46,12 @@ typedef struct mhe_stream_info {
  * at no clock. */
 #define MHE_GRANT_LOOKS 8
 #define MHE_GRANT_PASSED_OVER 2
+#define MHE_GRANT_STOPPED 3
 typedef struct mhe_grant {
     int64_t arrival;  /* number of the packet that the frame's sample came in */
     int32_t prepared; /* 1: its window was prepared ahead of it; MHE_GRANT_PASSED_OVER: it was not
-                       * taken at all, since the run was behind */
+                       * taken at all, since the run was behind; MHE_GRANT_STOPPED: the run was
+                       * stopped while it was estimated, nothing came of it */
     int32_t by_clock; /* 1: it had a deadline */
     int32_t
         refused; /* looks at the clock before an evaluation was broken off by it; -1: none was */

@@ -4,6 +4,7 @@
 #include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 void mhi_text_add(mhi_text *text, const char *format, ...) {
     va_list args, again;
@@ -50,6 +51,7 @@ mhe_status mhi_text_give(mhi_text *text, char **out, mhe_error *err) {
 }
 
 #define NEAREST_MAX 64
+#define BEGINNING 3 /* letters that say what is meant */
 
 /* Levenshtein distance without regard to letter case; names longer than NEAREST_MAX are compared by
  * their head. */
@@ -93,8 +95,20 @@ static const char *nearest_within(const char *name, const char *const *names, in
     return best;
 }
 
+/* An entry of which `name` is the beginning. */
+static const char *begun_by(const char *name, const char *const *names, int32_t n) {
+    const size_t length = strlen(name);
+    for (int32_t i = 0; i < n && length >= BEGINNING; i++) {
+        if (names[i] != NULL && strncasecmp(names[i], name, length) == 0) {
+            return names[i];
+        }
+    }
+    return NULL;
+}
+
 const char *mhi_nearest(const char *name, const char *const *names, int32_t n) {
-    return nearest_within(name, names, n, strlen(name) / 2 + 2);
+    const char *near = nearest_within(name, names, n, strlen(name) / 3 + 2);
+    return near != NULL ? near : begun_by(name, names, n);
 }
 
 const char *mhi_slip_of(const char *name, const char *const *names, int32_t n) {

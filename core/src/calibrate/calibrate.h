@@ -38,6 +38,7 @@ typedef struct mhi_motion {
 
 typedef struct mhi_calibration {
     const mhi_run *run, *start;
+    const mhi_use *persons_solver; /* for the config that is left behind; NULL: the run's. Lent */
     mhi_plan plan;
     const mhe_host *host;
     mhe_description *model; /* as it is in the file */
@@ -70,6 +71,8 @@ mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);
 /* search.c: from a start s to the solution, c->info says how it ended. */
 mhe_status mhi_calibration_search(mhi_calibration *c, mhi_ocp *ocp, const mhe_solver_ops *solver,
                                   void *self, mhe_solution *s, mhe_error *err);
+
+int32_t mhi_calibration_is_lost(const mhe_solve_info *info); /* 1: it has no result of its own */
 
 /* choose.c: the plan's entries as numbers, and which number of the model each belongs to. */
 mhe_status mhi_calibration_choose(mhi_calibration *c, mhe_error *err);

@@ -322,6 +322,9 @@ mhe_status mhi_person_config(const mhi_calibration *c, const char *file, mhi_tex
     mhi_run run = *c->run;
     mhe_status status = MHE_OK;
     run.model_file.file = file;
+    if (c->persons_solver != NULL) {
+        run.solver = *c->persons_solver;
+    }
     if (run.data.emg == NULL) {
         for (int32_t i = 0; i < c->plan.n_recordings && run.data.emg == NULL; i++) {
             run.data.markers = c->plan.recordings[i].markers;

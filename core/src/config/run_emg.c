@@ -23,6 +23,12 @@ static mhe_status check_channel(const mhi_run *run, int32_t i, mhe_error *err) {
                            LIST ": channel '%s' has %d shape factors for %d muscles", c->name,
                            (int)c->shape.n, (int)c->muscles.n);
     }
+    if (c->delay < 0 && c->delay != -1) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
+                           LIST ": channel '%s': 'delay' is %g s; EMG comes before the activation, "
+                                "so at least 0 (or -1: that of the section)",
+                           c->name, c->delay);
+    }
     for (int32_t k = 0; k < i; k++) {
         if (strcmp(run->emg.channels[k].name, c->name) == 0) {
             return mhi_fail_at(err, MHE_E_CONFIG, run->tree, c->node,
@@ -40,6 +46,12 @@ static mhe_status check_section(const mhi_run *run, const mhi_node *section, mhe
         return mhi_fail_at(err, MHE_E_CONFIG, run->tree, section,
                            "emg: 'band_low' is %g Hz, which is not below 'band_high', %g Hz",
                            e->band_low, e->band_high);
+    }
+    if (e->delay < 0 && e->delay != -1) {
+        return mhi_fail_at(err, MHE_E_CONFIG, run->tree, section,
+                           "emg: 'delay' is %g s; EMG comes before the activation, so at least 0 "
+                           "(or -1: what is usual)",
+                           e->delay);
     }
     const mhi_node *sources = mhi_node_find(mhi_tree_root(run->tree), "sources");
     if (run->data.emg == NULL && (sources == NULL || sources->first == NULL)) {

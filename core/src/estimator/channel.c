@@ -4,8 +4,12 @@
 #include <math.h>
 #include <string.h>
 
-#define UNSEEN 0.1     /* how much EMG may vary (of 1) of which little was seen, a variance ... */
-#define SEEN_AFTER 0.5 /* ... that falls to the e-th part within so long a look (s) */
+/* How much EMG may vary (of 1) of which little was seen, a variance that falls to the e-th part
+ * within SEEN_AFTER. A posture that begins wrong is held by EMG that is believed too much; measured
+ * velocities hold the motion themselves. */
+#define UNSEEN 0.1
+#define UNSEEN_WITH_RATES 0.05
+#define SEEN_AFTER 0.5 /* s */
 
 /* A row of the table before it has memory. A further quantity is a further row. */
 typedef struct row_setup {
@@ -158,6 +162,7 @@ mhe_status mhi_channels_create(const mhi_run *run, const mhi_ocp *ocp, const mhe
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < n_targets && status == MHE_OK; i++) {
         status = create_row(&setups[i], ocp, d, nodes, arena, &channels->rows[i], err);
+        channels->rows[i].unseen = run->data.rates ? UNSEEN_WITH_RATES : UNSEEN;
     }
     for (int32_t b = 0, i = n_targets; b < p->layout->n_blocks && status == MHE_OK; b++) {
         const mhe_block *block = mhe_layout_at(p->layout, b);
@@ -296,7 +301,8 @@ void mhi_channel_spread(mhi_channel *c, int32_t filled, double *spread) {
     for (int32_t i = 0; i < width; i++) {
         const double n = now[i], mean = now[width + i] / n;
         const double square = n > 0 ? fmax(0, now[2 * width + i] / n - mean * mean) : NAN;
-        const double unseen = c->seen ? 0 : UNSEEN * UNSEEN * exp(-n * c->interval / SEEN_AFTER);
+        const double unseen =
+            c->seen ? 0 : c->unseen * c->unseen * exp(-n * c->interval / SEEN_AFTER);
         c->varied[i] = sqrt(square);
         spread[i] = sqrt(square + unseen);
     }

@@ -29,6 +29,7 @@ typedef struct mhi_channel {
     int32_t frames;    /* by which what a node tracks lags behind */
     int32_t gap_nodes; /* the longest gap, in intervals */
     int32_t seen;      /* how much it varies is what was seen so far, however little */
+    double unseen;     /* else: how much it may vary of which little was seen */
     double interval;   /* s from node to node */
     double span;       /* s that a node's mean is over; 0: not known, or no mean */
 

@@ -22,6 +22,8 @@ mhe_status mhi_estimator_create(const mhi_run *run, const mhe_host *host, mhe_es
 /* The same on a description that was read before, for many estimators on one model; it is lent. */
 mhe_status mhi_estimator_create_on(const mhi_run *run, const mhe_description *description,
                                    const mhe_host *host, mhe_estimator **estimator, mhe_error *err);
+/* Puts the line of the config before the refusal of a plugin, which err->part names; -> status. */
+mhe_status mhi_estimator_locate(const mhi_run *run, mhe_status status, mhe_error *err);
 const mhi_system *mhi_estimator_system(const mhe_estimator *estimator);
 mhi_ocp *mhi_estimator_ocp(mhe_estimator *estimator);
 /* First state from outside the config (a reference), before the first push: q, qdot [n_q], NaN (or

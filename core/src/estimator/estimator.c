@@ -33,8 +33,7 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
     return status == MHE_OK ? mhi_estimator_motion(run, *description, host, err) : status;
 }
 
-/* Puts the line of the config before the refusal of a plugin, which err->part names. */
-static mhe_status locate(const mhi_run *run, mhe_status status, mhe_error *err) {
+mhe_status mhi_estimator_locate(const mhi_run *run, mhe_status status, mhe_error *err) {
     const mhi_use *const parts[] = {[MHE_PART_MODEL] = &run->model,
                                     [MHE_PART_MUSCLE] = &run->muscle,
                                     [MHE_PART_INTEGRATOR] = &run->integrator,
@@ -63,7 +62,7 @@ mhe_status mhe_estimator_covers(const mhe_estimator *e, double first, double las
     mhe_status status = MHI_NEED(err, {"estimator", e});
     if (status == MHE_OK) {
         status = mhi_system_covers(e->system, first, last, measured, err);
-        status = status == MHE_OK ? MHE_OK : locate(e->run, status, err);
+        status = status == MHE_OK ? MHE_OK : mhi_estimator_locate(e->run, status, err);
     }
     return status;
 }
@@ -240,7 +239,7 @@ static mhe_status create_on(const mhi_run *run, const mhe_description *descripti
             err->part = MHE_PART_NONE; /* of an earlier failure */
         }
         status = create_problem(e, err);
-        status = status == MHE_OK ? MHE_OK : locate(run, status, err);
+        status = status == MHE_OK ? MHE_OK : mhi_estimator_locate(run, status, err);
     }
     if (status == MHE_OK) {
         const mhe_system *f = mhi_system_face(e->system);

@@ -54,6 +54,10 @@ void mhi_rates_shift(mhi_rates *r) {
     }
 }
 
+double mhi_rates_misfit(const mhi_rates *r) {
+    return r->n_seen > 0 ? sqrt(r->squares / r->n_seen) : NAN;
+}
+
 static int32_t any(const mhi_rates *r, const double *values) {
     int32_t found = 0;
     for (int32_t i = 0; i < r->n_q && !found; i++) {
@@ -98,6 +102,8 @@ static void find_posture(mhi_rates *r, int32_t k, const double *times, const dou
     /* a frame that no posture comes near, where others fit, was not measured well */
     if (status == MHE_OK && !isnan(distance) && !(outlier > 0 && distance > r->nearest + outlier)) {
         r->nearest = fmin(r->nearest, distance);
+        r->squares += distance * distance / 3; /* the distance is that of a point */
+        r->n_seen++;
         memcpy(posture(r, k), r->found, sizeof(double) * (size_t)r->n_q);
     }
 }

@@ -17,6 +17,8 @@ typedef struct mhi_rates {
     double *found;    /* [n_q] */
     double *v;        /* [n_q] */
     double nearest;   /* m, the least distance that was left so far */
+    double squares;   /* m^2, of what was left of a coordinate, over ... */
+    int32_t n_seen;   /* ... so many postures */
     int32_t n_q, nodes;
 } mhi_rates;
 
@@ -27,6 +29,9 @@ mhe_status mhi_rates_create(mhi_rates *rates, const mhi_run *run, const mhi_syst
 void mhi_rates_free(mhi_rates *rates);
 void mhi_rates_clear(mhi_rates *rates);
 void mhi_rates_shift(mhi_rates *rates);
+/* How far markers were from the postures nearest to them so far, RMS of a coordinate (m): what is
+ * left of their errors in their segments, whatever muscles do. NAN: not known. */
+double mhi_rates_misfit(const mhi_rates *rates);
 /* Node k [times: of all nodes] has come with `markers` and `angles` (NULL: none): its posture, the
  * angles where there are any, else near to that of the node before or `near`; and by it the
  * velocities of node k and of the one before, into `channel`. */

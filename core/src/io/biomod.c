@@ -362,7 +362,9 @@ static void read_all(mhi_biomod *m) {
     double version = 0;
     if (!mhi_same_word(tag.text, "version") || !mhi_lex_numbers(&m->lex, tag.text, &version, 1) ||
         version < 1 || version > 4) {
-        mhi_build_fail(&m->b, tag.line, "a .bioMod file begins with 'version 1' to 'version 4'");
+        mhi_build_fail(
+            &m->b, tag.line,
+            "neither an .osim (XML) nor a .bioMod, which begins with 'version 1' to 'version 4'");
     }
     m->version = m->b.status == MHE_OK ? (int32_t)version : 0;
     while (m->b.status == MHE_OK && *(tag = mhi_lex_next(&m->lex)).text != '\0') {

@@ -2,11 +2,54 @@
 #include "io/slurp.h"
 
 #include "base/digest.h"
+#include "base/text.h"
 
+#include <dirent.h>
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+
+#define NAMES 64 /* of a folder that are near enough */
+
+/* The file that may have been meant by a name that is not there, as " (did you mean 'x'?)"; "". */
+static void near_file(const char *path, char *out, size_t size) {
+    const char *slash = strrchr(path, '/'), *name = slash != NULL ? slash + 1 : path;
+    char *folder = strndup(path, slash != NULL ? (size_t)(slash - path) + 1 : 0);
+    char *names[NAMES];
+    int32_t n = 0;
+    DIR *open = folder != NULL ? opendir(*folder != '\0' ? folder : ".") : NULL;
+    for (struct dirent *d = open != NULL ? readdir(open) : NULL; d != NULL && n < NAMES;
+         d = readdir(open)) {
+        const char *one = d->d_name;
+        if (*one != '.' && mhi_slip_of(name, &one, 1) != NULL && (names[n] = strdup(one)) != NULL) {
+            n++;
+        }
+    }
+    const char *near = mhi_slip_of(name, (const char *const *)names, n);
+    out[0] = '\0';
+    if (near != NULL) {
+        (void)snprintf(out, size, " (did you mean '%s'?)", near);
+    }
+    while (n > 0) {
+        free(names[--n]);
+    }
+    if (open != NULL) {
+        (void)closedir(open);
+    }
+    free(folder);
+}
+
+static mhe_status not_opened(const char *path, int why, mhe_error *err) {
+    char near[300] = "";
+    if (why == ENOMEM) {
+        return mhe_fail(err, MHE_E_MEMORY, "%s: no memory to open the file", path);
+    }
+    if (why == ENOENT) {
+        near_file(path, near, sizeof near);
+    }
+    return mhe_fail(err, MHE_E_INPUT, "%s: cannot be opened: %s%s", path, strerror(why), near);
+}
 
 /* Appends what `file` still holds; *text is the caller's to free in any case. */
 static mhe_status read_all(FILE *file, const char *path, char **text, size_t *length,
@@ -39,9 +82,7 @@ mhe_status mhi_slurp(const char *path, char **text, size_t *length, mhe_error *e
     *length = 0;
     FILE *file = fopen(path, "rb");
     if (file == NULL) {
-        return errno == ENOMEM
-                   ? mhe_fail(err, MHE_E_MEMORY, "%s: no memory to open the file", path)
-                   : mhe_fail(err, MHE_E_INPUT, "%s: cannot be opened: %s", path, strerror(errno));
+        return not_opened(path, errno, err);
     }
     struct stat info;
     mhe_status status = fstat(fileno(file), &info) == 0 && S_ISDIR(info.st_mode)

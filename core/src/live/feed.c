@@ -186,10 +186,10 @@ static void obey(mhi_feed *f, const mhe_grant *grant) {
     }
 }
 
-static void tell_granted(mhi_feed *f, double time) {
+static void tell_granted(mhi_feed *f, double time, mhe_status status) {
     mhe_grant grant;
     mhi_estimator_granted(f->estimator, &grant);
-    grant.prepared = f->prepared;
+    grant.prepared = status == MHE_E_INTERRUPTED ? MHE_GRANT_STOPPED : f->prepared;
     f->prepared = 0;
     if (f->pusher != NULL) {
         f->pusher(f->data, &grant, f->start + time);
@@ -216,8 +216,8 @@ static int32_t pass_over(mhi_feed *f, double time, const mhe_grant *grant) {
 
 static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_grant *grant,
                              mhe_error *err) {
-    if (pass_over(f, time, grant) || (f->repeats && grant == NULL)) {
-        return MHE_OK; /* also the frame in which the run was stopped when it was recorded */
+    if (pass_over(f, time, grant)) {
+        return MHE_OK;
     }
     mhe_estimate estimate = {.size = sizeof estimate};
     mhe_error why = {0};
@@ -232,9 +232,7 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_
     f->n_frames++;
     obey(f, grant);
     const mhe_status status = mhe_estimator_push(f->estimator, &frame, &estimate, &ready, &why);
-    if (status != MHE_E_INTERRUPTED) {
-        tell_granted(f, time);
-    }
+    tell_granted(f, time, status);
     if (status == MHE_E_ARGUMENT) { /* its time does not follow */
         f->n_out_of_order++;
         return MHE_OK;
@@ -350,14 +348,17 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
     int64_t before = f->n_frames;
     int32_t next = 0; /* grant */
     for (int32_t k = 0; k < p->n && status == MHE_OK; k++) {
+        const mhe_grant *grant = next < p->n_grants ? &p->grants[next] : NULL;
         double set, time = mhi_clock_time(clock, &work, k, &set);
         if (set != 0) {
             const double shift = clock->shift;
             tell_set(f, in, set);
             time += clock->shift - shift;
         }
-        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels,
-                             next < p->n_grants ? &p->grants[next] : NULL, err);
+        if (grant != NULL && grant->prepared == MHE_GRANT_STOPPED) {
+            break; /* nothing came of it and of those after it */
+        }
+        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, grant, err);
         next += f->n_frames > before;
         before = f->n_frames;
     }

@@ -188,7 +188,7 @@ static mhe_status take_grants(owned *o, mhe_error *err) {
         }
         last = (int64_t)row[0];
         *g = (mhe_grant){last,
-                         whole(row[1], 0, MHE_GRANT_PASSED_OVER),
+                         whole(row[1], 0, MHE_GRANT_STOPPED),
                          row[2] != 0,
                          whole(row[3], -1, INT32_MAX),
                          {0}};

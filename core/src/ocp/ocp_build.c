@@ -337,10 +337,16 @@ static mhe_status set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_
     for (int32_t i = 0; i < ocp->n_terms; i++) {
         const uint32_t reads = mhi_term_reads(&ocp->terms[i]);
         if ((reads & forces) != 0 || ocp->terms[i].layout.jacobian != MHE_JACOBIAN_DIAGONAL) {
-            return mhe_fail(err, MHE_E_CONFIG,
-                            "costs.%d: %s reads muscle forces or several signals at once: "
-                            "calibration has no derivatives of it by parameters",
-                            i, ocp->terms[i].id);
+            status = mhe_fail(err, MHE_E_CONFIG,
+                              "costs.%d: %s reads muscle forces or several signals at once: "
+                              "calibration has no derivatives of it by parameters. Leave it out "
+                              "here, and add it to the config that is left behind",
+                              i, ocp->terms[i].id);
+            if (err != NULL) {
+                err->part = MHE_PART_COST;
+                err->entry = i;
+            }
+            return status;
         }
     }
     ocp->estimated = setup->estimated;

@@ -51,7 +51,8 @@ static void markers_follow_their_misfit(void **state) {
     cost_rig rig;
     double misfit[COST_RIG_ROWS] = {0};
     open_rig(&rig, "{markers: 0.002, markers_misfit: 0.5}", MHE_FORMULATION_EXCITATION, 0);
-    const int at = cost_rig_at(&rig, "markers", 0);
+    const int at = cost_rig_at(&rig, "markers", 0), speeds = cost_rig_at(&rig, "qdot", 0);
+    misfit[speeds] = NAN;
     const double known[] = {0.001, 0.02, NAN}, sigma[] = {0.002, 0.01, 0.002};
     memcpy(misfit + at, known, sizeof known);
     rig.stage.y_spread = misfit;
@@ -59,6 +60,32 @@ static void markers_follow_their_misfit(void **state) {
     for (int i = 0; i < 3; i++) {
         assert_true(fabs(rig.J[at + i] * sigma[i] - 1) < 1e-12);
     }
+    cost_rig_close(&rig);
+}
+
+/* Velocities that were measured are followed, and markers then held by how far they are off their
+ * postures; a gap in them is like none. */
+static void measured_velocities_are_followed(void **state) {
+    (void)state;
+    cost_rig rig;
+    double spread[COST_RIG_ROWS] = {0};
+    open_rig(&rig,
+             "{markers: 0.002, markers_misfit: 0.5, markers_offset: 3, rates: 0.1, qdot: "
+             "4}",
+             MHE_FORMULATION_EXCITATION, 0);
+    const int markers = cost_rig_at(&rig, "markers", 0), speeds = cost_rig_at(&rig, "qdot", 0);
+    spread[markers] = 0.01;
+    spread[speeds] = 0.7;
+    rig.stage.y_spread = spread;
+    rig.y_ref[speeds] = 0.3;
+    rig.y_ref[speeds + 1] = NAN;
+    cost_rig_evaluate(&rig);
+    assert_true(fabs(rig.J[markers] * 0.03 - 1) < 1e-12);
+    assert_true(fabs(rig.r[speeds] * 0.1 - (rig.y[speeds] - 0.3)) < 1e-12);
+    assert_true(fabs(rig.r[speeds + 1] * 4 - rig.y[speeds + 1]) < 1e-12);
+    spread[speeds] = NAN; /* none were measured */
+    cost_rig_evaluate(&rig);
+    assert_true(fabs(rig.J[markers] * 0.005 - 1) < 1e-12);
     cost_rig_close(&rig);
 }
 
@@ -71,6 +98,9 @@ static void what_is_not_measured_is_held_loosely(void **state) {
              MHE_FORMULATION_EXCITATION, COST_RIG_TORQUES);
     const int at = cost_rig_at(&rig, "excitation", 0), markers = cost_rig_at(&rig, "markers", 0);
     rig.y_ref[at] = NAN; /* Biceps: a gap */
+    for (int i = 0; i < 2; i++) {
+        rig.y_ref[cost_rig_at(&rig, "qdot", 0) + i] = NAN;
+    }
     cost_rig_evaluate(&rig);
     assert_true(fabs(rig.r[at] - rig.y[at] / 0.5) < 1e-12);
     assert_true(fabs(rig.r[at + 1] - rig.y[at + 1] / 0.5) < 1e-12); /* Triceps: no electrode */
@@ -109,6 +139,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_largest_share_counts),
         cmocka_unit_test(markers_follow_their_misfit),
+        cmocka_unit_test(measured_velocities_are_followed),
         cmocka_unit_test(what_is_not_measured_is_held_loosely),
         cmocka_unit_test(activations_are_controls),
         cmocka_unit_test(a_muscle_that_is_none_is_refused),
