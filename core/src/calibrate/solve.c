@@ -321,21 +321,26 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
 /* What was found, and how well it is known. */
 static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_covariance out = {.size = sizeof out, .node = 0, .pp = c->covariance};
-    mhe_status status =
-        p->solver->covariance == NULL ? MHE_OK : p->solver->covariance(p->self, &out, err);
+    int32_t known = p->solver->covariance != NULL && !mhi_calibration_is_lost(&c->info);
+    mhe_status status = known ? p->solver->covariance(p->self, &out, err) : MHE_OK;
+    if (status == MHE_E_NUMERIC) { /* values, though nothing says how well they are known */
+        known = 0;
+        status = MHE_OK;
+    }
     for (int32_t i = 0; i < c->n && status == MHE_OK; i++) {
         mhi_estimated *e = &c->list[i];
         e->value = p->s.p[i] * e->unit;
         const double margin = 1e-4 * (e->upper - e->lower);
         e->at_bound = e->value < e->lower + margin || e->value > e->upper - margin;
-        e->sd = p->solver->covariance == NULL ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
+        e->sd = !known ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
         e->informed =
             e->at_bound || !(e->sd > 0.95 * e->prior_sd) || fabs(e->value - e->mean) > e->prior_sd;
         if (e->at_bound) {
             e->sd = 0;
         }
         for (int32_t j = 0; j < c->n; j++) {
-            c->covariance[i * c->n + j] *= e->unit * c->list[j].unit;
+            c->covariance[i * c->n + j] =
+                known ? c->covariance[i * c->n + j] * e->unit * c->list[j].unit : NAN;
         }
     }
     return status;
