@@ -40,10 +40,6 @@ static size_t doubles(int32_t n) {
     return sizeof(double) * (size_t)n;
 }
 
-static void say_nothing(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text; /* the system's own model has told all */
-}
-
 /* ---- what it is made of ---- */
 
 static const char *joint_name(const mhe_description *d, int32_t i) {
@@ -167,8 +163,7 @@ static mhe_status build(mhi_joint_force *j, const char *name, mhe_error *err) {
     if (status == MHE_OK) {
         status = keep_paths(j, err);
     }
-    j->quiet = *(const mhe_host *)s->host.data;
-    j->quiet.log = say_nothing;
+    j->quiet = mhi_host_quiet(s->host.data); /* the system's own model has told all */
     return status == MHE_OK ? mhi_model_create(s->model_plugin, &j->quiet, &j->loosened,
                                                s->model_config, &j->self, err)
                             : status;
