@@ -165,40 +165,34 @@ static mhe_status take_arrays(layers *l, mhe_error *err) {
     *kin = (mhe_kinematics){.size = sizeof *kin};
     *d = (mhe_acceleration){.size = sizeof *d};
     *all = (mhe_stage_values){.size = sizeof *all};
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {{&kin->mass, n_q * n_q},
-                  {&kin->bias, n_q},
-                  {&kin->length, n_p},
-                  {&kin->length_q, n_p * n_q},
-                  {&kin->length_qq, n_p * n_q * n_q},
-                  {&kin->marker, 3 * info->n_markers},
-                  {&kin->marker_q, 3 * info->n_markers * n_q},
-                  {&d->vdot, n_q},
-                  {&d->vdot_q, n_q * n_q},
-                  {&d->vdot_v, n_q * n_q},
-                  {&d->vdot_a, n_q * n_a},
-                  {&d->vdot_r, n_q * n_r},
-                  {&l->rate, n_m},
-                  {&l->rate_e, n_m},
-                  {&l->rate_a, n_m},
-                  {&all->cost, 1},
-                  {&all->grad_x, n_x},
-                  {&all->grad_u, n_u},
-                  {&all->hess_xx, n_x * n_x},
-                  {&all->hess_ux, n_u * n_x},
-                  {&all->hess_uu, n_u * n_u},
-                  {&all->x_next, n_x},
-                  {&all->A, n_x * n_x},
-                  {&all->B, n_x * n_u},
-                  {&l->near_x, n_x},
-                  {&l->near_u, n_u}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&l->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
+    const mhi_room rooms[] = {{&kin->mass, n_q * n_q},
+                              {&kin->bias, n_q},
+                              {&kin->length, n_p},
+                              {&kin->length_q, n_p * n_q},
+                              {&kin->length_qq, n_p * n_q * n_q},
+                              {&kin->marker, 3 * info->n_markers},
+                              {&kin->marker_q, 3 * info->n_markers * n_q},
+                              {&d->vdot, n_q},
+                              {&d->vdot_q, n_q * n_q},
+                              {&d->vdot_v, n_q * n_q},
+                              {&d->vdot_a, n_q * n_a},
+                              {&d->vdot_r, n_q * n_r},
+                              {&l->rate, n_m},
+                              {&l->rate_e, n_m},
+                              {&l->rate_a, n_m},
+                              {&all->cost, 1},
+                              {&all->grad_x, n_x},
+                              {&all->grad_u, n_u},
+                              {&all->hess_xx, n_x * n_x},
+                              {&all->hess_ux, n_u * n_x},
+                              {&all->hess_uu, n_u * n_u},
+                              {&all->x_next, n_x},
+                              {&all->A, n_x * n_x},
+                              {&all->B, n_x * n_u},
+                              {&l->near_x, n_x},
+                              {&l->near_u, n_u}};
+    if (MHI_TAKE_ROOMS(&l->arena, rooms, err) != MHE_OK) {
+        return MHE_E_MEMORY;
     }
     l->value = (mhe_acceleration){.size = sizeof l->value, .vdot = d->vdot};
     l->step = (mhe_stage_values){.size = sizeof l->step, .x_next = all->x_next};

@@ -13,7 +13,10 @@ const char *report_outcome(const mhi_calibration *c) {
 }
 
 const char *report_verdict(const mhi_estimated *e) {
-    return e->at_bound ? "at bound" : e->informed ? "informed" : "not informed";
+    return e->at_bound    ? "at bound"
+           : isnan(e->sd) ? "no deviation"
+           : e->informed  ? "informed"
+                          : "not informed";
 }
 
 static void find_in(const mhi_estimated *e, mhi_text *out) {
@@ -104,7 +107,13 @@ static void find_in_recording(const report_content *r, const report_recording *o
 
 void report_findings(report_content *r) {
     const mhi_calibration *c = r->c;
-    if (c->info.outcome != MHE_SOLVE_CONVERGED) {
+    if (mhi_calibration_is_lost(&c->info)) {
+        mhi_text_add(&r->findings,
+                     "the search was lost after %d iterations (%s): what stands here is how far it "
+                     "came. Do the costs say less noise than there is (residual_torque, EMG that "
+                     "is late or of another person)?\n",
+                     (int)c->info.iterations, report_outcome(c));
+    } else if (c->info.outcome != MHE_SOLVE_CONVERGED) {
         mhi_text_add(&r->findings,
                      "the solve did not converge (%s after %d iterations): more "
                      "calibrate.max_iterations may help\n",

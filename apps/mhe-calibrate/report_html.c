@@ -74,8 +74,12 @@ static void parameters_html(const report_content *r, mhi_text *out) {
         const mhi_estimated *e = &r->c->list[i];
         mhi_text_add(out, "<tr><td>");
         add_escaped(out, e->name);
-        mhi_text_add(out, "</td><td class=n>%.4g</td><td class=n>%.4g</td><td class=n>%.2g</td>",
-                     e->mean, e->value, e->sd);
+        mhi_text_add(out, "</td><td class=n>%.4g</td><td class=n>%.4g</td><td class=n>", e->mean,
+                     e->value);
+        if (!isnan(e->sd)) {
+            mhi_text_add(out, "%.2g", e->sd);
+        }
+        mhi_text_add(out, "</td>");
         band(out, e);
         mhi_text_add(out, "<td class='%s'>%s</td></tr>\n", e->informed ? "" : "warn",
                      report_verdict(e));

@@ -143,11 +143,37 @@ def muscles_limits(folder):
                    number(r["force_n"]), number(r["marker_mm"])] for r in Study(folder, "muscles-limits").rows()])
 
 
+# What issue and page hold a draw's held-out errors to.
+MISMATCH = {"exact": ("force_n", "N", 6), "noise": ("force_n", "N", 12), "plain": ("force_n", "N", None),
+            "insertions": ("force_n", "N", 16), "markers": ("q_deg", "deg", None)}
+
+
+def mismatch(folder):
+    """Held-out errors before and after calibration, draw by draw."""
+    found = {}
+    for r in Study(folder, "mismatch")["results"]:
+        name = "plain" if r["result"] == "plain" else r["errors"]
+        if r[MISMATCH[name][0]] != "":
+            found.setdefault((name, r["result"] == "before"), {})[int(r["trial"])] = r[MISMATCH[name][0]]
+    rows = []
+    for name, (what, unit, gate) in MISMATCH.items():
+        before, after = found.get((name, True), {}), found.get((name, False), {})
+        both = [t for t in after if t in before]
+        worse = sum(after[t] >= before[t] for t in both)
+        rows.append([f"*{name}*, {'forces' if unit == 'N' else 'joint angles'} ({unit})", f"{len(after)}",
+                     f"{number(min(before.values()))} to {number(max(before.values()))}" if before else "",
+                     ", ".join(f"{after[t]:.{1 if unit == 'N' else 2}f}" for t in sorted(after)),
+                     number(sum(after.values()) / len(after)) if after else "", "" if gate is None else f"{gate}",
+                     f"{len(both) - worse} of {len(both)}" if both else ""])
+    return table(["held-out motion", "draws", "before", "after, draw by draw", "mean", "at most", "better than before"], rows)
+
+
 BLOCKS = {
     "verdicts-windows": verdicts("windows"), "verdicts-noise": verdicts("noise"), "rates": rates, "forces": forces,
     "angles": angles, "anova-force": anova("force"), "anova-angles": anova("angles"), "runs": runs, "subset": subset,
     "emg-level": emg_level, "limits": limits, "emg-noise": emg_noise,
     "emg-noise-verdict": emg_noise_verdict,
+    "mismatch": mismatch,
     "muscles-limits": muscles_limits,
 }
 

@@ -120,6 +120,25 @@ static mhe_status fits_make(const mhe_description *d, void *model, double tolera
     return status;
 }
 
+/* Terms by their exponents, the first ones first: sums within sums then share most (polynomial.c).
+ */
+static void sort_terms(path_fit *fit) {
+    const size_t n = (size_t)fit->n;
+    for (int32_t i = 1; i < fit->n_terms; i++) {
+        uint8_t *here = fit->exponent + (size_t)i * n;
+        for (int32_t k = i; k > 0 && memcmp(here - n, here, n) > 0; k--, here -= n) {
+            const double coef = fit->coef[k];
+            fit->coef[k] = fit->coef[k - 1];
+            fit->coef[k - 1] = coef;
+            for (size_t j = 0; j < n; j++) {
+                const uint8_t e = here[j];
+                here[j] = here[(ptrdiff_t)j - (ptrdiff_t)n];
+                here[(ptrdiff_t)j - (ptrdiff_t)n] = e;
+            }
+        }
+    }
+}
+
 mhe_status fits_create(const mhe_host *host, const mhe_description *d, void *model,
                        double tolerance, double range, path_fits **out, mhe_error *err) {
     path_fits *fits = calloc(1, sizeof *fits);
@@ -135,6 +154,9 @@ mhe_status fits_create(const mhe_host *host, const mhe_description *d, void *mod
         if (status == MHE_OK) {
             (void)fits_write(digest, fits); /* next time it takes as long again, no more */
         }
+    }
+    for (int32_t i = 0; i < fits->n && status == MHE_OK; i++) {
+        sort_terms(&fits->fits[i]);
     }
     if (status == MHE_OK && fits_describe(d, fits) != 0) {
         status = mhe_fail(err, MHE_E_MEMORY, "no memory to fit paths");

@@ -61,6 +61,99 @@ static double polynomial_by_x(const mhe_polynomial *p, const double *const *powe
     return length;
 }
 
+/* The same for one to three coordinates, by sums within sums: terms that share their first
+ * exponents and stand together share those factors. A fit's terms are in that order (fit.c); any
+ * other gives the same, with more multiplications. */
+
+static double line_by_x(const mhe_polynomial *p, const double *row, double *g, double *h) {
+    double s = 0, s_x = 0, s_xx = 0;
+    for (int32_t term = 0; term < p->n_terms; term++) {
+        const double c = p->coef[term], *f = row + 3 * p->exponent[term];
+        s += c * f[0];
+        s_x += c * f[1];
+        s_xx += c * f[2];
+    }
+    g[0] = s_x;
+    h[0] = s_xx;
+    return s;
+}
+
+static double plane_by_x(const mhe_polynomial *p, const double *const *powers, double *g,
+                         double *h) {
+    const uint8_t *e = p->exponent, *end = e + 2 * (ptrdiff_t)p->n_terms;
+    const double *c = p->coef;
+    double s = 0, s_x = 0, s_y = 0, s_xx = 0, s_yx = 0, s_yy = 0;
+    while (e < end) {
+        const uint8_t first = e[0];
+        double r = 0, r_y = 0, r_yy = 0;
+        for (; e < end && e[0] == first; e += 2, c++) {
+            const double *f = powers[1] + 3 * e[1];
+            r += *c * f[0];
+            r_y += *c * f[1];
+            r_yy += *c * f[2];
+        }
+        const double *f = powers[0] + 3 * first;
+        s += f[0] * r;
+        s_x += f[1] * r;
+        s_xx += f[2] * r;
+        s_y += f[0] * r_y;
+        s_yx += f[1] * r_y;
+        s_yy += f[0] * r_yy;
+    }
+    g[0] = s_x, g[1] = s_y;
+    h[0] = s_xx, h[2] = s_yx, h[3] = s_yy;
+    return s;
+}
+
+static double space_by_x(const mhe_polynomial *p, const double *const *powers, double *g,
+                         double *h) {
+    const uint8_t *e = p->exponent, *end = e + 3 * (ptrdiff_t)p->n_terms;
+    const double *c = p->coef;
+    double s = 0;
+    while (e < end) {
+        const uint8_t first = e[0];
+        double a = 0, a_y = 0, a_z = 0, a_yy = 0, a_yz = 0, a_zz = 0;
+        while (e < end && e[0] == first) {
+            const uint8_t second = e[1];
+            double r = 0, r_z = 0, r_zz = 0;
+            for (; e < end && e[0] == first && e[1] == second; e += 3, c++) {
+                const double *f = powers[2] + 3 * e[2];
+                r += *c * f[0];
+                r_z += *c * f[1];
+                r_zz += *c * f[2];
+            }
+            const double *f = powers[1] + 3 * second;
+            a += f[0] * r;
+            a_y += f[1] * r;
+            a_yy += f[2] * r;
+            a_z += f[0] * r_z;
+            a_yz += f[1] * r_z;
+            a_zz += f[0] * r_zz;
+        }
+        const double *f = powers[0] + 3 * first;
+        s += f[0] * a;
+        g[0] += f[1] * a;
+        g[1] += f[0] * a_y;
+        g[2] += f[0] * a_z;
+        h[0] += f[2] * a;
+        h[3] += f[1] * a_y;
+        h[4] += f[0] * a_yy;
+        h[6] += f[1] * a_z;
+        h[7] += f[0] * a_yz;
+        h[8] += f[0] * a_zz;
+    }
+    return s;
+}
+
+/* g and h are 0 before. */
+static double derivatives_by_x(const mhe_polynomial *p, const double *const *powers, double *g,
+                               double *h) {
+    return p->n == 1   ? line_by_x(p, powers[0], g, h)
+           : p->n == 2 ? plane_by_x(p, powers, g, h)
+           : p->n == 3 ? space_by_x(p, powers, g, h)
+                       : polynomial_by_x(p, powers, g, h);
+}
+
 int polynomial_is_left(const path_route *route, const double *numbers) {
     const mhe_polynomial *p = route->length;
     for (int32_t k = 0; k < p->n; k++) {
@@ -105,7 +198,7 @@ double polynomial_length(const path_route *route, const double *numbers, route_w
         return polynomial_by_x(p, powers, NULL, NULL);
     }
     memset(g, 0, sizeof *g * (size_t)(n + n * n));
-    double length = polynomial_by_x(p, powers, g, h);
+    double length = derivatives_by_x(p, powers, g, h);
     memset(gradient, 0, sizeof *gradient * (size_t)rows);
     memset(hessian, 0, sizeof *hessian * (size_t)(rows * rows));
     for (int32_t k = 0; k < n; k++) {

@@ -78,7 +78,8 @@ double inertia_excess(const tree_joint &link) {
     }
     const double smallest = std::min(i[0], std::min(i[4], i[8]));
     return link.mass > 0 && (least > 0 || smallest < 2 * products || smallest <= 0)
-               ? std::max(least, 0.0) + 2 * products + std::max(-smallest, 0.0) + 1e-3 * sum + 1e-9
+               ? std::max(least, 0.0) + 2 * products + std::max(-smallest, 0.0) +
+                     1e-3 * std::fabs(sum) + 1e-9
                : 0;
 }
 

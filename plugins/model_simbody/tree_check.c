@@ -61,12 +61,6 @@ static mhe_status check_body(const mhe_description *d, int32_t i, mhe_error *err
         return mhe_fail(err, MHE_E_INPUT, "body '%s': centre of mass or inertia is not finite",
                         body->name);
     }
-    for (int k = 0; k < 3; k++) {
-        if (!(body->inertia[4 * k] >= 0)) {
-            return mhe_fail(err, MHE_E_INPUT, "body '%s': a moment of inertia is negative",
-                            body->name);
-        }
-    }
     for (int32_t k = 0; k < body->n_motions; k++) {
         mhe_status status =
             check_motion(&body->motions[k], d->n_coordinates + d->n_dependents, body->name, err);

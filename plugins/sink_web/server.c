@@ -264,12 +264,21 @@ static void make_token(web *w) {
 
 static mhe_status listen_on(web *w, mhe_error *err) {
     struct lws_context_creation_info info = {0};
+    char address[128];
+    const mhe_status found =
+        web_find_address(w->config.address, (int)w->config.port, address, sizeof address, err);
+    if (found != MHE_OK) {
+        return found;
+    }
     lws_set_log_level(0, NULL);
     info.port = w->config.port;
-    info.iface = w->config.address;
+    info.iface = address;
     info.protocols = protocols;
     info.user = w;
     info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND;
+    if (strchr(address, ':') == NULL) { /* else it listens on :: for any address of four numbers */
+        info.options |= LWS_SERVER_OPTION_DISABLE_IPV6;
+    }
     w->context = lws_create_context(&info);
     if (w->context == NULL) {
         return mhe_fail(
@@ -279,7 +288,12 @@ static mhe_status listen_on(web *w, mhe_error *err) {
             w->config.address, (int)w->config.port);
     }
     char line[256];
+    const int everywhere = strcmp(address, "0.0.0.0") == 0 || strcmp(address, "::") == 0;
     const int port = lws_get_vhost_listen_port(lws_get_vhost_by_name(w->context, "default"));
+    if (!everywhere && web_is_everywhere(port)) {
+        (void)web_close(w, NULL);
+        return mhe_fail(err, MHE_E_IO, "%s: libwebsockets cannot listen there alone", address);
+    }
     (void)snprintf(line, sizeof line, "the page: http://%s:%d/%s%s", w->config.address, port,
                    w->config.open ? "" : "?token=", w->config.open ? "" : w->token);
     w->host->log(w->host, MHE_LOG_INFO, line);
@@ -352,13 +366,18 @@ static mhe_status web_poll(void *self, double seconds, mhe_error *err) {
     return MHE_OK;
 }
 
+static void web_wake(void *self) {
+    lws_cancel_service(((web *)self)->context);
+}
+
 static const mhe_sink_ops web_ops = {.size = sizeof web_ops,
                                      .create = web_create,
                                      .destroy = web_destroy,
                                      .open = web_open,
                                      .take = web_take,
                                      .poll = web_poll,
-                                     .close = web_close};
+                                     .close = web_close,
+                                     .wake = web_wake};
 
 static const mhe_option web_options[] = {
     MHE_OPT_TEXT(struct web_config, address, 0, "127.0.0.1",

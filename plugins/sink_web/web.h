@@ -106,6 +106,12 @@ int web_write(web *w, web_client *c, size_t n, int text);
 void web_hold(const web_client *c, int on); /* what is written waits for what follows, until 0 */
 int web_is_full(const web_client *c);       /* no more can be written now */
 
+/* address.c: the address as numbers, or the interface's name. MHE_E_CONFIG, MHE_E_IO: nothing can
+ * be listened on there. */
+mhe_status web_find_address(const char *address, int port, char *numeric, size_t room,
+                            mhe_error *err);
+int web_is_everywhere(int port); /* all addresses of the machine are listened on at this port */
+
 /* answer.c */
 int web_send_answer(web *w, web_client *c); /* c->answer, if any; 1: sent */
 void web_answer(web_client *c, char *text); /* takes the text over */

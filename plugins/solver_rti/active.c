@@ -87,7 +87,7 @@ static void set_constants(qp *q) {
     }
 }
 
-/* The system of the present set, solved from w with multipliers `lambda` of 0. */
+/* The system of the present set, factorised and solved from w with multipliers `lambda` of 0. */
 static int32_t solve_set(qp *q, double regularisation) {
     const qp_shape *s = q->shape;
     set_constants(q);
@@ -113,6 +113,9 @@ static int32_t solve_set(qp *q, double regularisation) {
         q->w[i] += q->held[i] ? 0 : q->dw[i];
     }
     memcpy(q->lambda, q->dlambda, sizeof(double) * size_x(s));
+    if (q->update.at_once > 0) {
+        memcpy(q->update.side, q->side, sizeof(double) * size_z(s));
+    }
     return 1;
 }
 
@@ -133,29 +136,53 @@ static int32_t see_one(qp *q, ptrdiff_t at, double crossed, double pulled, look 
     return 1;
 }
 
+/* A simple state that the control before it took over its bound, or one that decays from such a
+ * state: once the control is back at its own bound it may well be inside. */
+static int32_t only_follows(const qp *q, ptrdiff_t at, double crossed, double *because) {
+    const double over = q->side[at] != 0                    ? 0
+                        : q->w[at] < q->lower[at] - crossed ? -1
+                        : q->w[at] > q->upper[at] + crossed ? 1
+                                                            : 0;
+    *because = over == *because ? over : 0;
+    return *because != 0;
+}
+
 /* Residuals at the present point and set, and the set that follows from them. */
 static look see(qp *q, const qp_limits *limits) {
     const qp_shape *s = q->shape;
     const double crossed = 0.5 * limits->feasibility, pulled = 0.5 * limits->stationarity;
     const int32_t simple = s->n_u + s->n_dense, m = s->in_order ? s->n_x - s->n_dense : 0;
     const int32_t first_control = m > 0 ? s->control_of[s->n_dense] : 0;
+    double *because = q->because; /* the side to which a state was taken by its control */
     look l = {0};
     memset(q->turned, 0, (size_t)s->n_x);
+    memset(because, 0, sizeof(double) * (size_t)s->ld_x);
     qp_slope(s, q->stages, q->w, q->lambda, q->slope);
     qp_gaps(s, q->stages, q->w, q->gap);
     for (size_t i = 0; i < size_x(s); i++) {
         l.feasibility = larger(l.feasibility, fabs(q->gap[i]));
     }
     for (int32_t k = 0; k <= s->N; k++) {
-        for (int32_t i = first_of(s, k); i < s->n_z; i++) {
+        for (int32_t i = s->n_u; i < s->n_z; i++) {
             const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const int32_t j = i - simple;
+            if (q->fixed[at] || (j >= 0 && j < m && only_follows(q, at, crossed, &because[j])) ||
+                !see_one(q, at, crossed, pulled, &l)) {
+                continue;
+            }
+            if (j >= 0) {
+                q->turned[j] = 1;
+            }
+        }
+        for (int32_t i = first_of(s, k); i < s->n_u; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const int32_t j = i - first_control;
             if (q->fixed[at] || !see_one(q, at, crossed, pulled, &l)) {
                 continue;
             }
-            if (i >= simple) {
-                q->turned[i - simple] = 1;
-            } else if (i >= first_control && i < first_control + m) {
-                q->turned[i - first_control] = 1;
+            if (j >= 0 && j < m) {
+                q->turned[j] = 1;
+                because[j] = q->side[at] != 0 ? q->side[at] : because[j];
             }
         }
     }
@@ -231,17 +258,29 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
     guess(q);
     int32_t result = QP_LIMIT;
     look l = {0};
+    q->update.known = 0;
     for (q->iterations = 0;
          q->iterations < (s->n_p > 0 ? MANY_SETS : MOST_SETS) && result == QP_LIMIT;) {
         if (limits->is_late != NULL && limits->is_late(limits->data)) {
             result = QP_LATE;
             break;
         }
-        if (!solve_set(q, limits->regularisation)) {
+        int32_t by_update = active_update(q);
+        if (!by_update && !solve_set(q, limits->regularisation)) {
             break;
         }
         q->iterations++;
         l = see(q, limits);
+        if (by_update && l.changes == 0 && !is_good(&l, limits)) {
+            by_update = 0;
+            if (!solve_set(q, limits->regularisation)) {
+                break;
+            }
+            l = see(q, limits);
+        }
+        if (!by_update) {
+            active_remember(q);
+        }
         follow_chains(q, limits);
         if (!isfinite(l.stationarity + l.feasibility)) {
             break;

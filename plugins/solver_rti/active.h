@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* active.h: what active.c and active_chain.c share. */
+/* active.h: what active.c, active_chain.c and active_update.c share. */
 #ifndef ACTIVE_H
 #define ACTIVE_H
 
@@ -36,5 +36,11 @@ static inline int32_t active_turn(qp *q, ptrdiff_t at, double w, double y, doubl
 /* Follows the bounds of simple state j and its control to a set that suits the present pulls; from
  * q->w, lambda, and slope at them. */
 void active_follow(qp *q, int32_t j, double crossed, double pulled);
+
+/* active_update.c: solves the present set's system by the factors of one before, as solve_set()
+ * does; 0: they are of no use. */
+int32_t active_update(qp *q);
+/* The factors are of the set in update.side, whose solution this is: w, lambda, and slope there. */
+void active_remember(qp *q);
 
 #endif

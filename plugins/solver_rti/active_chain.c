@@ -15,6 +15,7 @@ typedef struct chain {
     double *p, *s, *K, *v;   /* cost to go 1/2 p a^2 + s a; control v - K a */
     double *e, *a;           /* [N], [N+1] */
     double *pull_e, *pull_a; /* slopes at 0 without what the pair itself has part in */
+    double *because;         /* [N+1] the side to which the state was taken by its control */
 } chain;
 
 static double curvature(const qp *q, ptrdiff_t at) {
@@ -40,7 +41,8 @@ static chain open(qp *q, int32_t j) {
     const int32_t n = s->N + 1;
     double *m = q->rest_w; /* has 16 a stage */
     chain c = {.q = q, .j = j, .x = s->n_dense + j, .u = s->control_of[s->n_dense + j]};
-    double **const arrays[] = {&c.p, &c.s, &c.K, &c.v, &c.e, &c.a, &c.pull_e, &c.pull_a};
+    double **const arrays[] = {&c.p, &c.s,      &c.K,      &c.v,      &c.e,
+                               &c.a, &c.pull_e, &c.pull_a, &c.because};
     for (size_t i = 0; i < sizeof arrays / sizeof arrays[0]; i++) {
         *arrays[i] = m + (ptrdiff_t)i * n;
     }
@@ -99,12 +101,32 @@ static void sweep_forward(const chain *c) {
     }
 }
 
+/* Where a variable that no bound holds lies beyond one. */
+static double over(const qp *q, ptrdiff_t at, double w, double crossed) {
+    return q->side[at] != 0             ? 0
+           : w < q->lower[at] - crossed ? -1
+           : w > q->upper[at] + crossed ? 1
+                                        : 0;
+}
+
+/* States that a control took over their bounds, at once or some stages before. */
+static void find_reasons(const chain *c, double crossed) {
+    const qp *q = c->q;
+    c->because[0] = 0;
+    for (int32_t k = 0; k < q->shape->N; k++) {
+        const double control = q->fixed[e_at(c, k)] ? 0 : over(q, e_at(c, k), c->e[k], crossed);
+        const double reason = control != 0 ? control : c->because[k];
+        c->because[k + 1] = over(q, a_at(c, k + 1), c->a[k + 1], crossed) == reason ? reason : 0;
+    }
+}
+
 /* The next sets; how many bounds changed. */
 static int32_t update(const chain *c, double crossed, double pulled) {
     qp *q = c->q;
     const int32_t N = q->shape->N;
     int32_t changes = 0;
     double multiplier = 0; /* of the dynamics behind stage k */
+    find_reasons(c, crossed);
     for (int32_t k = N; k >= 0; k--) {
         const ptrdiff_t e = e_at(c, k), a = a_at(c, k);
         if (k < N && !q->fixed[e]) {
@@ -117,7 +139,7 @@ static int32_t update(const chain *c, double crossed, double pulled) {
             const double y = held ? -ACTIVE_HOLD * (c->a[k] - active_bound(q, a)) : 0;
             multiplier = y - curvature(q, a) * c->a[k] - c->pull_a[k] +
                          (k < N ? q->stages[k].by_state[c->x] * multiplier : 0);
-            changes += active_turn(q, a, c->a[k], y, crossed, pulled);
+            changes += c->because[k] == 0 && active_turn(q, a, c->a[k], y, crossed, pulled);
         }
     }
     return changes;

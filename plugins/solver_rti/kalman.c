@@ -14,7 +14,7 @@ typedef struct piece {
     size_t n;
 } piece;
 
-enum { N_PIECES = 27 };
+enum { N_PIECES = 36 };
 
 static void pieces(const qp_shape *s, kalman *f, piece *out) {
     const size_t N = (size_t)s->N, n = (size_t)s->n_dense, n_x = (size_t)s->n_x;
@@ -48,7 +48,16 @@ static void pieces(const qp_shape *s, kalman *f, piece *out) {
                                  {&f->eta, ld_x},
                                  {&f->lambda, ld_d},
                                  {&f->row, ld_w},
-                                 {&f->next, ld_x}};
+                                 {&f->next, ld_x},
+                                 {&f->units.g, KALMAN_LANES * z},
+                                 {&f->units.b, KALMAN_LANES * x},
+                                 {&f->units.s, KALMAN_LANES * x},
+                                 {&f->units.z, KALMAN_LANES * (N + 1) * ld_d},
+                                 {&f->units.x, KALMAN_LANES * x},
+                                 {&f->units.row, KALMAN_LANES * ld_d},
+                                 {&f->units.eta, KALMAN_LANES * ld_x},
+                                 {&f->units.pull, KALMAN_LANES * ld_z},
+                                 {&f->units.answers, KALMAN_GROUPS * KALMAN_LANES * (z + x)}};
     memcpy(out, all, sizeof all);
 }
 
@@ -74,27 +83,11 @@ void kalman_place(kalman *f, const qp_shape *s, double *memory) {
         return;
     }
     pieces(s, f, all);
-    memset(memory, 0, sizeof(double) * kalman_size(s));
+    memset(memory, 0, sizeof(double) * (kalman_size(s) - all[N_PIECES - 1].n)); /* but answers */
     for (int32_t i = 0; i < N_PIECES; i++) {
         *all[i].at = memory;
         memory += all[i].n;
     }
-}
-
-/* ---- blocks of a stage ---- */
-
-static double *FT_of(const kalman *f, int32_t k) {
-    return f->FT + (ptrdiff_t)k * f->shape->n_z * f->ld_d;
-}
-static double *C_of(const kalman *f, int32_t k) {
-    return f->C + (ptrdiff_t)k * f->shape->n_x * f->ld_d;
-}
-/* The simple states' part of a row of x, and of their controls of a row of u. */
-static const double *simple_x(const kalman *f, const double *rows, int32_t k) {
-    return rows + (ptrdiff_t)k * f->shape->ld_x + f->n;
-}
-static ptrdiff_t first_control(const kalman *f) {
-    return f->m > 0 ? f->shape->control_of[f->n] : 0;
 }
 
 void kalman_begin(kalman *f, const qp_stage *stages, int32_t free) {
@@ -107,7 +100,7 @@ void kalman_begin(kalman *f, const qp_stage *stages, int32_t free) {
             h[i] = stages[k].H[(ptrdiff_t)i * (s->ld_z + 1)];
         }
         if (k < s->N) {
-            s->kernels->transpose(f->n, s->n_z, stages[k].F, s->ld_z, FT_of(f, k), f->ld_d);
+            s->kernels->transpose(f->n, s->n_z, stages[k].F, s->ld_z, kalman_FT_of(f, k), f->ld_d);
         }
     }
 }
@@ -118,10 +111,10 @@ void kalman_begin(kalman *f, const qp_stage *stages, int32_t free) {
 static int32_t complete_squares(kalman *f, const qp_stage *stage, const double *diagonal,
                                 int32_t k) {
     const qp_shape *s = f->shape;
-    const ptrdiff_t z = (ptrdiff_t)k * s->ld_z, a = s->n_u + f->n, u = first_control(f);
+    const ptrdiff_t z = (ptrdiff_t)k * s->ld_z, a = s->n_u + f->n, u = kalman_first_control(f);
     const double *h = f->h + z, *d = diagonal + z;
     const double *alpha = stage->by_state + f->n, *beta = stage->by_control + f->n;
-    const double *p_next = simple_x(f, f->p, k + 1);
+    const double *p_next = kalman_simple_x(f, f->p, k + 1);
     double *inverse = f->inverse + z, *p = f->p + (ptrdiff_t)k * s->ld_x + f->n;
     double *K = f->K + (ptrdiff_t)k * s->ld_x + f->n;
     double *closed = f->closed + (ptrdiff_t)k * s->ld_x + f->n;
@@ -146,10 +139,10 @@ static int32_t complete_squares(kalman *f, const qp_stage *stage, const double *
 /* Rows of F^T for the closed loop, and those of u times their covariances. */
 static void close_loop(kalman *f, int32_t k) {
     const qp_shape *s = f->shape;
-    const double *FT = FT_of(f, k), *K = simple_x(f, f->K, k);
+    const double *FT = kalman_FT_of(f, k), *K = kalman_simple_x(f, f->K, k);
     const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z;
-    const ptrdiff_t u = first_control(f);
-    double *C = C_of(f, k);
+    const ptrdiff_t u = kalman_first_control(f);
+    double *C = kalman_C_of(f, k);
     memcpy(C, FT + s->n_u * f->ld_d, sizeof(double) * (size_t)(s->n_x * f->ld_d));
     for (int32_t j = 0; j < f->m; j++) {
         double *to = C + (f->n + j) * f->ld_d;
@@ -171,7 +164,7 @@ static void close_loop(kalman *f, int32_t k) {
 static int32_t begin_free(kalman *f, const qp_stage *stage, const double *diagonal) {
     const qp_shape *s = f->shape;
     const int32_t n = f->n, ld_w = f->ld_w;
-    const double *p = simple_x(f, f->p, 0);
+    const double *p = kalman_simple_x(f, f->p, 0);
     const uint8_t *held = f->held + s->n_u;
     double *W = kalman_W_of(f, 0); /* [Q, I], without what is held */
     memset(W, 0, sizeof(double) * (size_t)(n * ld_w));
@@ -203,10 +196,11 @@ static int32_t begin_free(kalman *f, const qp_stage *stage, const double *diagon
 static void predict(kalman *f, const qp_stage *stage, int32_t k) {
     const qp_shape *s = f->shape;
     const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_d = f->ld_d;
-    const double *FT = FT_of(f, k), *C = C_of(f, k), *closed = simple_x(f, f->closed, k);
+    const double *FT = kalman_FT_of(f, k), *C = kalman_C_of(f, k),
+                 *closed = kalman_simple_x(f, f->closed, k);
     const double *beta = stage->by_control + n;
-    const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z + first_control(f);
-    const double *of_control = f->noise + first_control(f) * ld_d;
+    const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z + kalman_first_control(f);
+    const double *of_control = f->noise + kalman_first_control(f) * ld_d;
     const int32_t spread = k > 0 || f->free;
     double *next = f->before;
     s->kernels->product(n, n, s->n_u, 1, FT, ld_d, f->noise, ld_d, NULL, next, ld_x, 1);
@@ -285,167 +279,4 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
     }
     f->known = s->N;
     return 1;
-}
-
-/* ---- solution ---- */
-
-/* Slopes of the costs to go of simple states -> s, and what controls do without any pull -> v. */
-static void sweep_simple(kalman *f, const qp_stage *stages, const double *g, const double *b) {
-    const qp_shape *s = f->shape;
-    const ptrdiff_t u = first_control(f), a = s->n_u + f->n;
-    for (int32_t k = s->N; k >= 0; k--) {
-        const double *slope = g + (ptrdiff_t)k * s->ld_z;
-        double *to_go = f->s + (ptrdiff_t)k * s->ld_x + f->n;
-        if (k == s->N) {
-            memcpy(to_go, slope + a, sizeof(double) * (size_t)f->m);
-            continue;
-        }
-        const double *alpha = stages[k].by_state + f->n, *beta = stages[k].by_control + f->n;
-        const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z, *K = simple_x(f, f->K, k);
-        const double *p_next = simple_x(f, f->p, k + 1), *s_next = simple_x(f, f->s, k + 1);
-        const double *c = simple_x(f, b, k);
-        double *v = f->v + (ptrdiff_t)k * s->ld_z;
-        for (int32_t i = 0; i < s->n_u; i++) {
-            v[i] = -inverse[i] * slope[i];
-        }
-        for (int32_t j = 0; j < f->m; j++) {
-            const double t = p_next[j] * c[j] + s_next[j], e = slope[u + j] + beta[j] * t;
-            v[u + j] = -inverse[u + j] * e;
-            to_go[j] = slope[a + j] + alpha[j] * t - K[j] * e;
-        }
-    }
-}
-
-/* Mean of a free first state: simple states at the least of their costs to go. */
-static void begin_mean(kalman *f, const double *g) {
-    const qp_shape *s = f->shape;
-    const double *D = kalman_D_of(f, 0);
-    for (int32_t i = 0; i < s->n_x; i++) {
-        double mean = 0;
-        for (int32_t j = 0; j < f->n && i < f->n; j++) {
-            mean -= D[i * s->ld_x + j] * g[s->n_u + j];
-        }
-        f->x[i] = i < f->n ? mean : f->held[s->n_u + i] ? 0 : -f->s[i] / f->p[i];
-    }
-}
-
-/* Means behind each measurement. */
-static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, const double *b) {
-    const qp_shape *s = f->shape;
-    const int32_t n = f->n, ld_d = f->ld_d;
-    const ptrdiff_t u = first_control(f);
-    if (f->free) {
-        begin_mean(f, g);
-    }
-    for (int32_t k = 0; k < s->N; k++) {
-        const int32_t moves = k > 0 || f->free;
-        const double *beta = stages[k].by_control + n, *closed = simple_x(f, f->closed, k);
-        const double *v = f->v + (ptrdiff_t)k * s->ld_z, *x = f->x + (ptrdiff_t)k * s->ld_x;
-        double *y = f->row, *m = f->next, *z = kalman_of_d(f, f->z, k + 1);
-        memcpy(m, b + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)s->ld_x);
-        for (int32_t j = 0; j < f->m; j++) {
-            m[n + j] += beta[j] * v[u + j] + (moves ? closed[j] * x[n + j] : 0);
-        }
-        memset(z, 0, sizeof(double) * (size_t)ld_d);
-        memcpy(z, m, sizeof(double) * (size_t)n);
-        s->kernels->add_transposed(s->n_u, n, 1, FT_of(f, k), ld_d, v, z);
-        if (moves) {
-            s->kernels->add_transposed(s->n_x, n, 1, C_of(f, k), ld_d, x, z);
-        }
-        memcpy(m, z, sizeof(double) * (size_t)n);
-        /* U m + U^-T g, then the factor's row of S^-1 and what it takes off m */
-        const int32_t width = k + 1 == s->N ? n : s->n_x;
-        memset(y, 0, sizeof(double) * (size_t)f->ld_w);
-        memcpy(y, g + (ptrdiff_t)(k + 1) * s->ld_z + s->n_u, sizeof(double) * (size_t)n);
-        s->kernels->substitute(n, n, kalman_U_of(f, k + 1), ld_d,
-                               kalman_of_d(f, f->U_inverse, k + 1), y);
-        s->kernels->add(n, n, 1, kalman_U_of(f, k + 1), ld_d, z, y);
-        memcpy(y + n, m, sizeof(double) * (size_t)width);
-        memset(y + n + width, 0, sizeof(double) * (size_t)(f->ld_w - n - width));
-        s->kernels->substitute(n, n + width, kalman_W_of(f, k + 1), f->ld_w,
-                               kalman_of_d(f, f->W_inverse, k + 1), y);
-        memset(z, 0, sizeof(double) * (size_t)ld_d);
-        memcpy(z, y, sizeof(double) * (size_t)n);
-        memcpy(f->x + (ptrdiff_t)(k + 1) * s->ld_x, y + n, sizeof(double) * (size_t)width);
-    }
-}
-
-/* Pulls: dense states, multipliers of the closed loop, controls of the closed loop -> v. */
-static void sweep_back(kalman *f, const qp_stage *stages, double *w, double *lambda) {
-    const qp_shape *s = f->shape;
-    const int32_t n = f->n, n_x = s->n_x, ld_d = f->ld_d;
-    const ptrdiff_t u = first_control(f);
-    memset(f->eta, 0, sizeof(double) * (size_t)s->ld_x);
-    for (int32_t k = s->N; k > 0; k--) {
-        const int32_t last = k == s->N;
-        double *x = row_z(s, w, k) + s->n_u, *y = kalman_of_d(f, f->z, k),
-               *out = row_x(s, lambda, k - 1);
-        memcpy(x, f->x + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)n);
-        if (!last) {
-            s->kernels->add(n, n_x, 1, kalman_D_of(f, k), s->ld_x, f->eta, x);
-            s->kernels->add(n, n_x, 1, kalman_W_of(f, k) + n, f->ld_w, f->eta, y);
-        }
-        s->kernels->substitute_back(n, kalman_W_of(f, k), f->ld_w, kalman_of_d(f, f->W_inverse, k),
-                                    y, f->row);
-        memset(f->lambda, 0, sizeof(double) * (size_t)ld_d);
-        memcpy(f->lambda, f->eta, sizeof(double) * (size_t)n);
-        s->kernels->add_transposed(n, n, 1, kalman_U_of(f, k), ld_d, f->row, f->lambda);
-        memcpy(out, f->eta, sizeof(double) * (size_t)s->ld_x);
-        memcpy(out, f->lambda, sizeof(double) * (size_t)n);
-        const double *beta = stages[k - 1].by_control + n, *closed = simple_x(f, f->closed, k - 1);
-        const double *inverse = f->inverse + (ptrdiff_t)(k - 1) * s->ld_z;
-        double *v = f->v + (ptrdiff_t)(k - 1) * s->ld_z;
-        memset(f->pull, 0, sizeof(double) * (size_t)s->n_u);
-        s->kernels->add(s->n_u, n, 1, FT_of(f, k - 1), ld_d, f->lambda, f->pull);
-        for (int32_t j = 0; j < f->m; j++) {
-            f->pull[u + j] += beta[j] * out[n + j];
-        }
-        for (int32_t i = 0; i < s->n_u; i++) {
-            v[i] += inverse[i] * f->pull[i];
-        }
-        for (int32_t j = 0; j < f->m; j++) {
-            f->eta[n + j] = closed[j] * out[n + j];
-        }
-        memset(f->eta, 0, sizeof(double) * (size_t)n);
-        s->kernels->add(k > 1 || f->free ? n_x : 0, n, 1, C_of(f, k - 1), ld_d, f->lambda, f->eta);
-    }
-    if (f->free) {
-        double *x = row_z(s, w, 0) + s->n_u;
-        memcpy(x, f->x, sizeof(double) * (size_t)n);
-        s->kernels->add(n, n_x, 1, kalman_D_of(f, 0), s->ld_x, f->eta, x);
-    }
-}
-
-/* Simple states and controls, and the multipliers of the former as they are with their costs. */
-static void follow_simple(kalman *f, const qp_stage *stages, const double *b, double *w,
-                          double *lambda) {
-    const qp_shape *s = f->shape;
-    const ptrdiff_t u = first_control(f), a = s->n_u + f->n;
-    double *first = row_z(s, w, 0) + s->n_u;
-    for (int32_t i = f->free ? f->n : 0; i < s->n_x; i++) { /* the pull of the others on each */
-        const int32_t held = !f->free || f->held[s->n_u + i];
-        first[i] = held ? 0 : (f->eta[i] - f->s[i]) / f->p[i];
-    }
-    for (int32_t k = 0; k < s->N; k++) {
-        const double *alpha = stages[k].by_state + f->n, *beta = stages[k].by_control + f->n;
-        const double *K = simple_x(f, f->K, k), *c = simple_x(f, b, k);
-        const double *p_next = simple_x(f, f->p, k + 1), *s_next = simple_x(f, f->s, k + 1);
-        double *now = row_z(s, w, k), *next = row_z(s, w, k + 1);
-        double *multiplier = row_x(s, lambda, k) + f->n;
-        memcpy(now, f->v + (ptrdiff_t)k * s->ld_z, sizeof(double) * (size_t)s->n_u);
-        for (int32_t j = 0; j < f->m; j++) {
-            now[u + j] -= K[j] * now[a + j];
-            next[a + j] = alpha[j] * now[a + j] + beta[j] * now[u + j] + c[j];
-            multiplier[j] -= p_next[j] * next[a + j] + s_next[j];
-        }
-    }
-    memset(row_z(s, w, s->N), 0, sizeof(double) * (size_t)s->n_u);
-}
-
-void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const double *b, double *w,
-                  double *lambda) {
-    sweep_simple(f, stages, g, b);
-    sweep_forward(f, stages, g, b);
-    sweep_back(f, stages, w, lambda);
-    follow_simple(f, stages, b, w, lambda);
 }

@@ -27,6 +27,24 @@
 
 #include "stage_qp.h"
 
+/* One unit of a right-hand side (kalman_answers.c). */
+#define KALMAN_LANES 8
+#define KALMAN_GROUPS 3 /* of eight, there is room for */
+typedef struct kalman_unit {
+    ptrdiff_t at;  /* its place among all w; no first state */
+    double g;      /* slope there */
+    int32_t moves; /* a control that is held there moves by 1 */
+} kalman_unit;
+
+/* Memory for eight of them: each number is eight, one behind the other. */
+typedef struct kalman_units {
+    double *g, *b;            /* right-hand sides [size_z], [size_x]: 0 but in kalman_answer() */
+    int32_t dense;            /* a slope of g is one of a dense state */
+    double *s, *z, *x;        /* [size_x], [N+1][ld_d], [size_x] */
+    double *row, *eta, *pull; /* [ld_d], [ld_x], [ld_z] */
+    double *answers;          /* [KALMAN_GROUPS], each of [size_z] and [size_x] */
+} kalman_units;
+
 typedef struct kalman {
     const qp_shape *shape;
     const uint8_t *held; /* [size_z] of the last factorisation: constants */
@@ -50,6 +68,7 @@ typedef struct kalman {
     double *T, *L, *noise;  /* [n_x x ld_d], [n x ld_d], [n_u x ld_d] scratch */
     double *s, *v, *z, *x;  /* of a solution: [size_x + ld_x], [size_z], [N+1][ld_d], [N+1][ld_x] */
     double *pull, *eta, *lambda, *row, *next; /* [ld_z], [ld_x], [ld_d], [ld_w], [ld_x] scratch */
+    kalman_units units;
 } kalman;
 
 /* May it be used for this shape? */
@@ -66,6 +85,27 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
                       const uint8_t *held);
 void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const double *b, double *w,
                   double *lambda);
+
+/* Solutions with the factors to n <= 8 units, of a first state that is fixed: w [size_z][8] and
+ * lambda [size_x][8], those behind n without a meaning. */
+void kalman_answer(kalman *f, const qp_stage *stages, int32_t n, const kalman_unit *list, double *w,
+                   double *lambda);
+
+/* Blocks of a stage. */
+static inline double *kalman_FT_of(const kalman *f, int32_t k) {
+    return f->FT + (ptrdiff_t)k * f->shape->n_z * f->ld_d;
+}
+static inline double *kalman_C_of(const kalman *f, int32_t k) {
+    return f->C + (ptrdiff_t)k * f->shape->n_x * f->ld_d;
+}
+/* The simple states' part of a row of x. */
+static inline const double *kalman_simple_x(const kalman *f, const double *rows, int32_t k) {
+    return rows + (ptrdiff_t)k * f->shape->ld_x + f->n;
+}
+/* The first of the controls of simple states, which stand in their order. */
+static inline int32_t kalman_first_control(const kalman *f) {
+    return f->m > 0 ? f->shape->control_of[f->n] : 0;
+}
 
 /* Blocks of a node. */
 static inline double *kalman_U_of(const kalman *f, int32_t k) {

@@ -20,6 +20,11 @@ typedef struct kernels {
     void (*product)(int32_t m, int32_t n, int32_t k, double alpha, const double *A, int32_t ld_a,
                     const double *B, int32_t ld_b, const double *D, double *C, int32_t ld_c,
                     int32_t upper);
+    /* C [m x n] = D + alpha A B with A [m x k]; n is a multiple of 8, and nothing lies behind it.
+     */
+    void (*product_rows)(int32_t m, int32_t n, int32_t k, double alpha, const double *A,
+                         int32_t ld_a, const double *B, int32_t ld_b, const double *D, double *C,
+                         int32_t ld_c);
     /* C [m x n] += A diag(d); d has zeros behind n. */
     void (*add_columns)(int32_t m, int32_t n, const double *A, int32_t ld_a, const double *d,
                         double *C, int32_t ld_c);

@@ -12,18 +12,19 @@ typedef double vec4 __attribute__((vector_size(32), aligned(8), may_alias));
 #define AT(p) (*(const vec4 *)(p))
 #define PUT(p) (*(vec4 *)(p))
 
-/* `rows` rows of C from column j on, 8 columns; `rows` is a constant once inlined. */
-__attribute__((always_inline)) static inline void block(int32_t rows, int32_t k, double alpha,
-                                                        const double *A, int32_t ld_a,
+/* `rows` rows of C from column j on, 8 columns; `rows` is a constant once inlined, and so is
+ * whether A is transposed. */
+__attribute__((always_inline)) static inline void block(int32_t rows, int32_t transposed, int32_t k,
+                                                        double alpha, const double *A, int32_t ld_a,
                                                         const double *B, int32_t ld_b,
                                                         const double *D, double *C, int32_t ld_c) {
     vec4 sum[4][2] = {{{0}}};
     for (int32_t p = 0; p < k; p++) {
         const vec4 left = AT(B + p * ld_b), right = AT(B + p * ld_b + 4);
-        const double *a = A + p * ld_a;
+        const double *a = A + (transposed ? p * ld_a : p);
         for (int32_t r = 0; r < rows; r++) {
-            sum[r][0] += a[r] * left;
-            sum[r][1] += a[r] * right;
+            sum[r][0] += a[transposed ? r : r * ld_a] * left;
+            sum[r][1] += a[transposed ? r : r * ld_a] * right;
         }
     }
     for (int32_t r = 0; r < rows; r++) {
@@ -38,26 +39,40 @@ __attribute__((always_inline)) static inline void block(int32_t rows, int32_t k,
     }
 }
 
-static void product(int32_t m, int32_t n, int32_t k, double alpha, const double *A, int32_t ld_a,
-                    const double *B, int32_t ld_b, const double *D, double *C, int32_t ld_c,
-                    int32_t upper) {
+__attribute__((always_inline)) static inline void blocks(int32_t transposed, int32_t m, int32_t n,
+                                                         int32_t k, double alpha, const double *A,
+                                                         int32_t ld_a, const double *B,
+                                                         int32_t ld_b, const double *D, double *C,
+                                                         int32_t ld_c, int32_t upper) {
     for (int32_t i = 0; i < m; i += 4) {
         const int32_t rows = m - i;
         for (int32_t j = upper ? i : 0; j < n; j += 8) {
-            const double *a = A + i, *b = B + j;
+            const double *a = A + (transposed ? i : i * ld_a), *b = B + j;
             double *c = C + i * ld_c + j;
             const double *before = D != NULL ? D + i * ld_c + j : NULL;
             if (rows >= 4) {
-                block(4, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
+                block(4, transposed, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             } else if (rows == 3) {
-                block(3, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
+                block(3, transposed, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             } else if (rows == 2) {
-                block(2, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
+                block(2, transposed, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             } else {
-                block(1, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
+                block(1, transposed, k, alpha, a, ld_a, b, ld_b, before, c, ld_c);
             }
         }
     }
+}
+
+static void product(int32_t m, int32_t n, int32_t k, double alpha, const double *A, int32_t ld_a,
+                    const double *B, int32_t ld_b, const double *D, double *C, int32_t ld_c,
+                    int32_t upper) {
+    blocks(1, m, n, k, alpha, A, ld_a, B, ld_b, D, C, ld_c, upper);
+}
+
+static void product_rows(int32_t m, int32_t n, int32_t k, double alpha, const double *A,
+                         int32_t ld_a, const double *B, int32_t ld_b, const double *D, double *C,
+                         int32_t ld_c) {
+    blocks(0, m, n, k, alpha, A, ld_a, B, ld_b, D, C, ld_c, 0);
 }
 
 static inline void subtract_row(int32_t from, int32_t n, double a, const double *x, double *y) {
@@ -212,6 +227,7 @@ static void mirror(int32_t n, double *M, int32_t ld) {
 
 const kernels KERNELS_TABLE = {.name = KERNELS_NAME,
                                .product = product,
+                               .product_rows = product_rows,
                                .add_columns = add_columns,
                                .add_rows = add_rows,
                                .factor = factor,

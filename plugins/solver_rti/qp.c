@@ -21,7 +21,8 @@ static size_t recursion_size(const qp_shape *s) {
 
 size_t qp_size(const qp_shape *s) {
     const size_t z = size_z(s), x = size_x(s);
-    const size_t doubles = (4 + 8) * z + (1 + 5) * x + recursion_size(s) + border_size(s);
+    const size_t doubles =
+        (4 + 8) * z + (1 + 5) * x + recursion_size(s) + border_size(s) + update_size(s);
     const size_t bytes = (s->n_p > 0 ? BORDER_BYTES : 0) + sizeof(double) * doubles +
                          sizeof(qp_side) * 2 * z + 2 * z + x;
     return (bytes + 63) / 64 * 64;
@@ -48,10 +49,12 @@ void qp_place(qp *q, const qp_shape *s, void *memory) {
         *of_x[i] = take(&m, x);
     }
     double *recursion = take(&m, recursion_size(s)), *columns = take(&m, border_size(s));
+    update_place(&q->update, s, take(&m, update_size(s)));
     if (s->n_p > 0) {
         q->border = (qp_border *)take(&m, BORDER_BYTES / sizeof *m);
         border_place(q->border, s, columns);
     }
+    q->because = take(&m, (size_t)s->ld_x);
     q->sides = (qp_side *)m;
     q->fixed = (uint8_t *)(q->sides + 2 * z);
     q->held = q->fixed + z;

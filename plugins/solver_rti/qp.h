@@ -39,6 +39,16 @@ typedef struct qp_side {
     double shift;    /* ... and its constant part */
 } qp_side;
 
+/* What the factors answer to changes of the set that they were made for (active_update.c). */
+#define QP_MOST_CHANGES (KALMAN_GROUPS * KALMAN_LANES)
+typedef struct qp_update {
+    int32_t at_once;                   /* groups of answers that cost less than factors; 0: none */
+    int32_t known;                     /* all of the next line is */
+    double *side, *w, *slope, *lambda; /* that set, its solution and the slope there */
+    int32_t n[KALMAN_GROUPS];          /* answers so far, to changes at these places: */
+    ptrdiff_t at[KALMAN_GROUPS][KALMAN_LANES];
+} qp_update;
+
 typedef struct qp {
     const qp_shape *shape;
     const qp_stage *stages;
@@ -63,11 +73,14 @@ typedef struct qp {
     double *recursion_memory;
     riccati riccati;
     kalman kalman;
-    double *side;     /* [size_z] active.c: -1, 1: held at the lower, the upper bound; 0: at none */
-    uint8_t *held;    /* [size_z] controls and fixed variables that are constants */
+    double *side;  /* [size_z] active.c: -1, 1: held at the lower, the upper bound; 0: at none */
+    uint8_t *held; /* [size_z] controls and fixed variables that are constants */
+    qp_update update;
+    double *because;  /* [ld_x] scratch of active.c */
     uint8_t *turned;  /* [n_x] simple states with bounds, or a control with bounds, that changed */
     int32_t programs; /* solved since qp_place(), and those of them in which no set was found */
     int32_t fallbacks;
+    int32_t updates; /* of all these, sets solved by the factors of one before */
     /* Of Newton systems, with what their factors take, since that was told (qp_take_work()); and
      * sweeps along chains, many of which make one. */
     int32_t solutions, sweeps;
@@ -117,6 +130,10 @@ int32_t qp_take_work(qp *q);
 void qp_newton(qp *q, const double *g, const double *b, double *w, double *lambda);
 /* Where costs allow it: on covariances. */
 int32_t qp_best(const qp *q);
+
+/* active_update.c */
+size_t update_size(const qp_shape *s); /* doubles */
+void update_place(qp_update *update, const qp_shape *s, double *memory);
 
 /* active.c: the program by a primal-dual active set, from the bounds at which the multipliers
  * z_lower and z_upper say w will stay: QP_SOLVED within the limits, QP_LATE, or QP_LIMIT: no set

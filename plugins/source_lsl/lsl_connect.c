@@ -7,8 +7,7 @@
 #include <string.h>
 
 #define MOST_CHANNELS 4096
-#define PULL 512   /* samples at once */
-#define ANSWER 2.0 /* s that a sender may take to describe itself, and to connect */
+#define PULL 512 /* samples at once */
 
 static char *copy(const char *text) {
     char *out = strdup(text == NULL ? "" : text);
@@ -21,6 +20,7 @@ static char *copy(const char *text) {
 }
 
 void lsl_disconnect(lsl_source *source, lsl_stream *s) {
+    lsl_close_lines(source, s);
     if (s->inlet != NULL) {
         source->lsl.destroy_inlet(s->inlet);
         s->inlet = NULL;
@@ -131,7 +131,7 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, lsl_streaminfo info, d
     /* The library's own way to find a sender again passes over other labels: it is not used. */
     s->inlet = l->create_inlet(info, (int32_t)ceil(source->config.buffer), 0, 0);
     if (s->inlet != NULL) {
-        whole = l->get_fullinfo(s->inlet, ANSWER, &code);
+        whole = l->get_fullinfo(s->inlet, LSL_ANSWER, &code);
     }
     if (whole == NULL) {
         status = mhe_fail(err, MHE_RETRY, "a stream with %s does not answer", s->predicate);
@@ -140,7 +140,7 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, lsl_streaminfo info, d
         l->destroy_streaminfo(whole);
     }
     if (status == MHE_OK) {
-        l->open_stream(s->inlet, ANSWER, &code);
+        l->open_stream(s->inlet, LSL_ANSWER, &code);
         status = code == lsl_no_error
                      ? MHE_OK
                      : mhe_fail(err, MHE_RETRY, "stream '%s' does not open", s->name);
@@ -154,6 +154,7 @@ mhe_status lsl_connect(lsl_source *source, lsl_stream *s, lsl_streaminfo info, d
     const double offset = l->time_correction(s->inlet, clock, &code);
     s->has_offset = code == lsl_no_error && isfinite(offset);
     s->offset = s->has_offset ? offset : 0;
+    lsl_open_lines(source, s, info);
     s->newest = s->asked = lsl_now();
     return MHE_OK;
 }

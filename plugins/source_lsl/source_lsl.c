@@ -102,8 +102,10 @@ static mhe_status drop_backlog(lsl_source *source) {
         lsl_stream *s = &source->streams[i];
         const unsigned long most = s->room * (unsigned long)s->n_channels;
         int32_t code = 0;
-        while (source->lsl.pull_chunk_d(s->inlet, s->values, s->stamps, most, s->room, 0, &code) >
-               0) {
+        for (int32_t k = 0; k < s->n_lines; k++) {
+            while (source->lsl.pull_chunk_d(s->lines[k].inlet, s->values, s->stamps, most, s->room,
+                                            0, &code) > 0) {
+            }
         }
     }
     return MHE_OK;
@@ -147,16 +149,8 @@ static void tell(const mhe_source_taker *taker, int32_t event, int32_t i, const 
     taker->event(taker->data, event, i, text);
 }
 
-/* Samples that are there, at most one pull; returns how many. */
-static int32_t pull(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
+static void give(lsl_source *source, int32_t i, int32_t n, const mhe_source_taker *taker) {
     lsl_stream *s = &source->streams[i];
-    int32_t code = 0;
-    if (s->inlet == NULL) {
-        return 0;
-    }
-    const unsigned long elements = source->lsl.pull_chunk_d(
-        s->inlet, s->values, s->stamps, s->room * (unsigned long)s->n_channels, s->room, 0, &code);
-    const int32_t n = (int32_t)(elements / (unsigned long)s->n_channels);
     if (n > 0) {
         const mhe_chunk chunk = {.size = sizeof chunk,
                                  .stream = i,
@@ -171,11 +165,34 @@ static int32_t pull(lsl_source *source, int32_t i, const mhe_source_taker *taker
             tell(taker, MHE_SOURCE_BACK, i, s, "is back");
         }
         taker->chunk(taker->data, &chunk);
-    } else if (code == lsl_lost_error) {
-        source->lsl.destroy_inlet(s->inlet);
-        s->inlet = NULL;
     }
-    return n;
+}
+
+/* Samples that are there, at most one pull of each connection; returns the most that one had. */
+static int32_t pull(lsl_source *source, int32_t i, const mhe_source_taker *taker) {
+    lsl_stream *s = &source->streams[i];
+    const unsigned long most = s->room * (unsigned long)s->n_channels;
+    int32_t longest = 0;
+    for (int32_t k = 0; k < s->n_lines; k++) {
+        int32_t code = 0;
+        lsl_inlet inlet = s->lines[k].inlet;
+        const unsigned long elements =
+            inlet == NULL
+                ? 0
+                : source->lsl.pull_chunk_d(inlet, s->values, s->stamps, most, s->room, 0, &code);
+        const int32_t n = (int32_t)(elements / (unsigned long)s->n_channels);
+        give(source, i, lsl_take_new(s, k, n), taker);
+        longest = n > longest ? n : longest;
+        if (n == 0 && code == lsl_lost_error && k == 0) {
+            lsl_close_lines(source, s); /* ends the loop */
+            source->lsl.destroy_inlet(s->inlet);
+            s->inlet = NULL;
+        } else if (n == 0 && code == lsl_lost_error) {
+            source->lsl.destroy_inlet(inlet);
+            s->lines[k].inlet = NULL;
+        }
+    }
+    return longest;
 }
 
 static int same_texts(char **a, char **b, int32_t n) {
@@ -335,6 +352,9 @@ static const mhe_option lsl_options[] = {
                  "The library's file; without: the system's, else the one beside the plugin."),
     MHE_OPT_REAL(struct lsl_config, buffer, 10, 1, 3600, "s",
                  "What the library keeps while nobody reads."),
+    MHE_OPT_INT(struct lsl_config, connections, 3, 1, LSL_MOST_LINES, "1",
+                "Connections to each stream of frames; the first that has a sample gives it, since "
+                "senders with liblsl before 1.14 look once a millisecond for each of them."),
 };
 
 static const mhe_plugin lsl_plugin = {.size = sizeof lsl_plugin,

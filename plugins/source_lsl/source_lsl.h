@@ -11,7 +11,20 @@ struct lsl_config { /* filled by the core from the option table */
     const char *library;
     mhe_text_list markers, emg, angles; /* predicates */
     double buffer;                      /* s */
+    int32_t connections;
 };
+
+#define LSL_ANSWER 2.0   /* s that a sender may take to describe itself, and to connect */
+#define LSL_MOST_LINES 4 /* connections to a stream */
+#define LSL_GIVEN 64     /* samples that one may be behind another */
+
+/* A connection to a stream, and the stamps of samples that others gave before it: a ring. */
+typedef struct lsl_line {
+    lsl_inlet inlet;
+    double given[LSL_GIVEN];
+    int32_t first, n;
+    int32_t goes_along; /* its samples are those that the others have */
+} lsl_line;
 
 /* One stream: what was asked for, and what was found. */
 typedef struct lsl_stream {
@@ -33,6 +46,8 @@ typedef struct lsl_stream {
     double newest;           /* s of CLOCK_MONOTONIC, the last sample's arrival */
     double *values, *stamps; /* room for one pull */
     unsigned long room;      /* samples */
+    int32_t n_lines;
+    lsl_line lines[LSL_MOST_LINES]; /* the first is `inlet` */
 } lsl_stream;
 
 typedef struct lsl_source {
@@ -60,5 +75,12 @@ void lsl_end_search(lsl_source *source, lsl_stream *stream);
 mhe_status lsl_connect(lsl_source *source, lsl_stream *stream, lsl_streaminfo info, double clock,
                        mhe_error *err);
 void lsl_disconnect(lsl_source *source, lsl_stream *stream);
+
+/* lsl_lines.c: more connections to a stream of frames, which is connected. */
+void lsl_open_lines(lsl_source *source, lsl_stream *stream, lsl_streaminfo info);
+void lsl_close_lines(lsl_source *source, lsl_stream *stream); /* all but `inlet` */
+/* Of n samples in stream->values that came by a line, those that came by no other before are moved
+ * to the front; returns how many. */
+int32_t lsl_take_new(lsl_stream *stream, int32_t line, int32_t n);
 
 #endif

@@ -118,8 +118,9 @@ static mhe_status parse_analog(cursor c, double time, double *scratch, size_t ro
     return status;
 }
 
-mhe_status rt_parse_data(const rt_packet *packet, double *scratch, size_t room,
-                         const rt_taker *taker, mhe_error *err) {
+/* The components of one type. */
+static mhe_status parse_components(const rt_packet *packet, uint64_t wanted, double *scratch,
+                                   size_t room, const rt_taker *taker, mhe_error *err) {
     cursor c = {packet->body, packet->body + packet->length};
     uint64_t microseconds, frame, components;
     if (!take(&c, 8, &microseconds) || !take(&c, 4, &frame) || !take(&c, 4, &components)) {
@@ -135,13 +136,20 @@ mhe_status rt_parse_data(const rt_packet *packet, double *scratch, size_t room,
         }
         const cursor content = {c.at, c.at + (size - RT_HEADER)};
         c.at = content.end;
-        if (type == COMPONENT_3D) {
-            status = parse_3d(content, time, scratch, room, taker, err);
-        } else if (type == COMPONENT_ANALOG) {
-            status = parse_analog(content, time, scratch, room, taker, err);
-        } /* others were not asked for */
+        if (type == wanted) { /* others were not asked for */
+            status = (wanted == COMPONENT_3D ? parse_3d : parse_analog)(content, time, scratch,
+                                                                        room, taker, err);
+        }
     }
     return status;
+}
+
+mhe_status rt_parse_data(const rt_packet *packet, double *scratch, size_t room,
+                         const rt_taker *taker, mhe_error *err) {
+    const mhe_status analog = parse_components(packet, COMPONENT_ANALOG, scratch, room, taker, err);
+    const mhe_status markers =
+        parse_components(packet, COMPONENT_3D, scratch, room, taker, analog == MHE_OK ? err : NULL);
+    return analog == MHE_OK ? markers : analog;
 }
 
 size_t rt_write_command(const char *text, uint8_t *out, size_t room) {

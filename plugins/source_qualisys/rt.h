@@ -61,9 +61,9 @@ typedef struct rt_taker {
                    uint32_t first, const double *values);
 } rt_taker;
 
-/* Hands out what stands in the body of a data packet. `scratch` [room]: as many doubles as may be
- * needed for one component; what does not fit is MHE_E_INPUT, as is a body that is cut short.
- * Time: s of QTM's own clock. */
+/* Hands out what stands in the body of a data packet, markers last: a frame has its own EMG.
+ * `scratch` [room]: as many doubles as may be needed for one component; what does not fit is
+ * MHE_E_INPUT, as is a body that is cut short. Time: s of QTM's own clock. */
 mhe_status rt_parse_data(const rt_packet *packet, double *scratch, size_t room,
                          const rt_taker *taker, mhe_error *err);
 

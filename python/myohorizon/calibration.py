@@ -16,7 +16,7 @@ class Calibration:
     Attributes:
         outcome: "converged", or why not.
         parameters: a dict each: parameter, before, after, sd, prior_sd, lower, upper (numbers of the parameter's own unit;
-            factors are 1), verdict ("informed", "not informed", "at bound").
+            factors are 1), verdict ("informed", "not informed", "at bound", "no deviation").
         recordings: a dict each: name, held_out, before and after, each with marker_rms_mm, emg_rms (1), and q_deg, force_n,
             activation where the truth is known (else None).
         model: path of calibrated.osim.

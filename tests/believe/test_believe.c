@@ -159,6 +159,22 @@ static void doubtful_emg_is_named(void **state) {
     free_rig(r);
 }
 
+static void a_copied_column_is_told(void **state) {
+    (void)state;
+    rig *r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->emg[k * MUSCLES + 2] = r->emg[k * MUSCLES];
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_NOTE, "columns that are the same to the last digit: C as A");
+    assert_int_equal(r->findings.n, 1);
+    r->emg[20 * MUSCLES] += 1e-12;
+    r->findings.n = 0;
+    assert_int_equal(check_emg(r), MHE_OK);
+    assert_int_equal(r->findings.n, 0);
+    free_rig(r);
+}
+
 static void muscles_rest_at_times(void **state) {
     (void)state;
     rig *r = new_rig();
@@ -256,6 +272,15 @@ static void markers_that_hold_or_are_gone(void **state) {
     }
     mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
     expect(r, MHI_FINDING_DOUBTFUL, "repeat to the last digit: K (25 %");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+    r = new_rig();
+    for (int k = 1; k < FRAMES; k += 2) { /* 50 Hz written at 100 Hz */
+        memcpy(&r->markers[k * width], &r->markers[(k - 1) * width],
+               (size_t)width * sizeof(double));
+    }
+    mhi_believe_markers(&r->run, &model, &r->recording, &r->findings);
+    expect(r, MHI_FINDING_DOUBTFUL, "50 % of the frames repeat all markers of the one before");
     assert_int_equal(r->findings.n, 1);
     free_rig(r);
     r = new_rig();
@@ -435,6 +460,7 @@ int main(void) {
         cmocka_unit_test(sound_data_give_no_finding),
         cmocka_unit_test(emg_that_is_none_is_refused),
         cmocka_unit_test(doubtful_emg_is_named),
+        cmocka_unit_test(a_copied_column_is_told),
         cmocka_unit_test(muscles_rest_at_times),
         cmocka_unit_test(a_cost_without_its_emg_is_told),
         cmocka_unit_test(angles_against_their_ranges),

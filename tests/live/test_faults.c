@@ -156,6 +156,53 @@ static void a_port_in_use(void **state) {
     }
 }
 
+/* Whether a port of loopback takes a connection there. */
+static int answers(uint32_t address, int port) {
+    struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
+    at.sin_addr.s_addr = htonl(address);
+    const int fd = socket(AF_INET, SOCK_STREAM, 0);
+    const int code = connect(fd, (struct sockaddr *)&at, sizeof at);
+    (void)close(fd);
+    return code == 0;
+}
+
+static int here, elsewhere;
+
+static void *knock(void *data) {
+    static const char url[] = "http://127.0.0.1:";
+    (void)data;
+    here = elsewhere = -1;
+    if (live_words_wait(&rig.words, url, 1)) {
+        const int port = atoi(strstr(rig.words.text, url) + strlen(url));
+        here = answers(INADDR_LOOPBACK, port);
+        elsewhere = answers(INADDR_LOOPBACK + 1, port);
+    }
+    mhe_live_stop(rig.live);
+    return NULL;
+}
+
+/* The page is to be had at the address that was asked for, and at no other of this machine. */
+static void one_address_alone(void **state) {
+    (void)state;
+    static const char demo[] = "{plugin: mhe.source.recording, markers: " ARM "/demo_markers.trc}";
+    const mhe_status status =
+        run("address", demo, ", {plugin: mhe.sink.web, port: 0}", NULL, 0, knock);
+    if (status == MHE_E_PLUGIN || strstr(rig.err.text, "no plugin") != NULL) {
+        skip(); /* built without libwebsockets */
+    }
+    assert_int_equal(status, MHE_OK);
+    mhe_free(rig.summary);
+    assert_int_equal(here, 1);
+    assert_int_equal(elsewhere, 0);
+    assert_int_equal(run("other", demo, ", {plugin: mhe.sink.web, port: 0, address: 203.0.113.77}",
+                         NULL, 0, NULL),
+                     MHE_E_IO);
+    assert_non_null(strstr(rig.err.text, "'203.0.113.77' is none of this machine's"));
+    assert_int_equal(
+        run("none", demo, ", {plugin: mhe.sink.web, port: 0, address: 300.1.2.3}", NULL, 0, NULL),
+        MHE_E_CONFIG);
+}
+
 /* A device whose port sends garbage in the middle of a run, then works again. */
 static qtm_server *server;
 static int went_on;
@@ -192,9 +239,9 @@ static void garbage_on_a_devices_port(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(a_clock_that_jumps),       cmocka_unit_test(nothing_but_nan),
-        cmocka_unit_test(other_channels),           cmocka_unit_test(another_rate),
-        cmocka_unit_test(two_of_one_name),          cmocka_unit_test(a_port_in_use),
-        cmocka_unit_test(garbage_on_a_devices_port)};
+        cmocka_unit_test(a_clock_that_jumps), cmocka_unit_test(nothing_but_nan),
+        cmocka_unit_test(other_channels),     cmocka_unit_test(another_rate),
+        cmocka_unit_test(two_of_one_name),    cmocka_unit_test(a_port_in_use),
+        cmocka_unit_test(one_address_alone),  cmocka_unit_test(garbage_on_a_devices_port)};
     return cmocka_run_group_tests(tests, NULL, live_rig_clean);
 }

@@ -23,7 +23,7 @@ static live_rig run;
 
 /* ---- the sender: a thread that sends as it is told, 100 times a second ---- */
 
-#define AHEAD 50 /* frames that the run may be behind; then it is sent to ten times as slowly */
+#define AHEAD 50 /* frames that the run may be behind; then it is waited for */
 
 static atomic_int wanted, sent; /* what; how many frames by the sender that is there now */
 
@@ -106,8 +106,8 @@ static void *send(void *data) {
         if (outlet != NULL) {
             send_markers(outlet, how, k, start + clock + at);
             atomic_fetch_add(&sent, 1);
-            if (is_ahead(before, &unheard)) {
-                lsl_rig_rest(0.1);
+            while (is_ahead(before, &unheard) && atomic_load(&wanted) == how) {
+                lsl_rig_rest(0.02);
             }
         }
     }

@@ -134,14 +134,15 @@ double live_rig_state(live_rig *r, const char *key) {
 
 int live_rig_wait_frames(live_rig *r, int32_t more) {
     const struct timespec pause = {0, 10000000};
-    const double enough = live_rig_state(r, "frames") + more;
-    for (int32_t i = 0; i < (int32_t)(100 * PATIENCE); i++) {
-        if (live_rig_state(r, "frames") >= enough) {
-            return 1;
-        }
+    double frames = live_rig_state(r, "frames");
+    const double enough = frames + more;
+    for (int32_t i = 0; frames < enough && i < (int32_t)(100 * PATIENCE); i++) {
+        const double now = live_rig_state(r, "frames");
+        i = now > frames ? 0 : i; /* however slowly: it goes on */
+        frames = now;
         (void)nanosleep(&pause, NULL);
     }
-    return 0;
+    return frames >= enough;
 }
 
 double *live_rig_table(const char *name, const char *file, int32_t *n_rows, int32_t *n_columns) {

@@ -88,6 +88,9 @@ typedef struct mhe_sink_ops {
      * none. [cold] */
     mhe_status (*poll)(void *self, double seconds, mhe_error *err);
     mhe_status (*close)(void *self, mhe_error *err); /* what is buffered goes out. [cold] */
+    /* There is an estimate: a poll that waits comes back at once, or the next one does. NULL:
+     * polls are made short instead. [any], waits for nobody */
+    void (*wake)(void *self);
 } mhe_sink_ops;
 
 #ifdef __cplusplus

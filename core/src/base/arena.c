@@ -54,6 +54,16 @@ char *mhi_arena_format(mhi_arena *arena, const char *format, ...) {
     return text;
 }
 
+mhe_status mhi_arena_rooms(mhi_arena *arena, const mhi_room *rooms, size_t n, mhe_error *err) {
+    for (size_t i = 0; i < n; i++) {
+        *rooms[i].array = MHI_TAKE(arena, double, rooms[i].n);
+        if (*rooms[i].array == NULL) {
+            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+        }
+    }
+    return MHE_OK;
+}
+
 void mhi_arena_free(mhi_arena *arena) {
     struct mhi_arena_block *block = arena->blocks;
     while (block != NULL) {

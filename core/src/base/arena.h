@@ -4,6 +4,7 @@
 #define MHI_ARENA_H
 
 #include <mhe/abi.h>
+#include <stddef.h>
 
 typedef struct mhi_arena {
     struct mhi_arena_block *blocks; /* {0} is an empty arena */
@@ -21,5 +22,16 @@ void mhi_arena_free(mhi_arena *arena);
 
 /* Array of n values of type T. */
 #define MHI_TAKE(arena, T, n) ((T *)mhi_arena_take((arena), sizeof(T) * (size_t)(n)))
+
+/* Arrays of numbers that are taken together. */
+typedef struct mhi_room {
+    double **array;
+    ptrdiff_t n;
+} mhi_room;
+
+/* Each of the n rooms gets its array; MHE_E_MEMORY where one does not. [cold] */
+mhe_status mhi_arena_rooms(mhi_arena *arena, const mhi_room *rooms, size_t n, mhe_error *err);
+#define MHI_TAKE_ROOMS(arena, rooms, err) \
+    mhi_arena_rooms((arena), (rooms), sizeof(rooms) / sizeof *(rooms), (err))
 
 #endif

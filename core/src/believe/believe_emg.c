@@ -197,6 +197,42 @@ static void check_channels(const char *path, const mhe_description *d, const mhi
     mhi_text_free(&beyond);
 }
 
+/* 1: the two channels are the same to the last digit, and more than rest. */
+static int32_t are_twins(const mhi_recording *r, int32_t n_m, int32_t a, int32_t b) {
+    int32_t n = 0;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        const double *of = r->emg + (ptrdiff_t)k * n_m;
+        if (memcmp(&of[a], &of[b], sizeof *of) != 0) {
+            return 0;
+        }
+        n += of[a] > REST;
+    }
+    return n > 0;
+}
+
+/* One electrode's EMG for several muscles may be meant; a column that was copied is not. */
+static void check_twins(const char *path, const mhe_description *d, const mhi_recording *r,
+                        mhi_findings *findings) {
+    mhi_text twins = {0};
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        int32_t k = 0;
+        while (k < i && !are_twins(r, d->n_muscles, k, i)) {
+            k++;
+        }
+        if (k < i) {
+            mhi_text_add(&twins, "%s%s as %s", twins.length == 0 ? "" : ", ", d->muscles[i].name,
+                         d->muscles[k].name);
+        }
+    }
+    if (twins.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_NOTE,
+                         "right where one electrode stands for several muscles (emg.channels says "
+                         "so)",
+                         "%s: columns that are the same to the last digit: %s", path, twins.data);
+    }
+    mhi_text_free(&twins);
+}
+
 /* EMG that is there for part of the frames: estimates with and without it differ. */
 static void check_overlap(const char *path, const mhi_recording *r, int32_t n_m,
                           mhi_findings *findings) {
@@ -253,6 +289,9 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
     mhe_status status = MHE_OK;
     if (run->emg.n_channels == 0) {
         status = check_scale(path, all, d->n_muscles, err);
+    }
+    if (status == MHE_OK && run->emg.n_channels == 0) {
+        check_twins(path, d, r, findings);
     }
     if (status == MHE_OK) {
         check_channels(path, d, r, all, findings);

@@ -21,11 +21,12 @@
 #define SLIGHT_TURN 1.5 /* degrees */
 #define SLIGHT_SHIFT 0.004 /* m */
 #define SLIGHT_SCALE 0.02
-#define UNIT 1.8        /* times: people differ less */
-#define LARGE_TURN 15.0 /* degrees: as many are the joints off */
-#define LARGE_SHIFT 0.1 /* m */
-#define FITTING 0.005   /* m RMS: what explains so much is the explanation */
-#define LYING 55.0      /* degrees from upright throughout */
+#define LEAST_SCALE 1e-4 /* further apart are no two units that markers are written in */
+#define UNIT 1.8         /* times: people differ less */
+#define LARGE_TURN 15.0  /* degrees: as many are the joints off */
+#define LARGE_SHIFT 0.1  /* m */
+#define FITTING 0.005    /* m RMS: what explains so much is the explanation */
+#define LYING 55.0       /* degrees from upright throughout */
 
 typedef struct trial {
     mhi_pose pose;
@@ -117,7 +118,8 @@ static int32_t is_slight(const mhi_pose *pose) {
 static void consider(trial *best, const mhi_pose *pose, double rms, int32_t cost) {
     const int better = rms < best->rms / NEARLY - 1e-4;
     const int simpler = rms < best->rms * NEARLY + 1e-4 && cost < best->cost;
-    if (!isnan(rms) && (better || simpler || (cost == best->cost && rms < best->rms))) {
+    const int possible = pose->scale > LEAST_SCALE && pose->scale < 1 / LEAST_SCALE;
+    if (!isnan(rms) && possible && (better || simpler || (cost == best->cost && rms < best->rms))) {
         *best = (trial){*pose, rms, cost};
     }
 }

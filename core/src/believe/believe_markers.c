@@ -9,6 +9,7 @@
 
 #define STILL 0.1         /* s of one and the same position to the last digit */
 #define STILL_SHARE 0.01  /* of the frames */
+#define STEPS_SHARE 0.2   /* of the frames */
 #define MISSING_SHARE 0.2 /* of the frames without any marker */
 #define MOVES 1e-4        /* m: a recording in which nothing moves more shows no motion */
 #define JUMP 0.01         /* m of most markers together between two frames, beyond ... */
@@ -73,6 +74,36 @@ static void check_still(const char *path, const mhe_description *d, const mhi_re
                          "%s: positions repeat to the last digit: %s", path, still.data);
     }
     mhi_text_free(&still);
+}
+
+/* Frames in which every marker repeats the one before, which was no repetition itself. */
+static int32_t count_steps(const mhi_recording *r, int32_t n_k) {
+    const ptrdiff_t width = 3 * (ptrdiff_t)n_k;
+    int32_t n = 0, last = 0;
+    for (int32_t k = 1; k < r->n_frames; k++) {
+        const double *p = r->markers + k * width;
+        const int32_t same = memcmp(p, p - width, sizeof *p * (size_t)width) == 0;
+        int32_t there = 0;
+        for (int32_t i = 0; i < n_k; i++) {
+            there |= !isnan(p[3 * i]);
+        }
+        n += same && !last && there;
+        last = same;
+    }
+    return n;
+}
+
+/* Frames of another rate that were written at this one without anything between. */
+static void check_steps(const char *path, const mhe_description *d, const mhi_recording *r,
+                        mhi_findings *findings) {
+    const int32_t n = d->n_markers > 0 ? count_steps(r, d->n_markers) : 0;
+    if (n > STEPS_SHARE * r->n_frames) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "frames of a slower camera, each written several times? Take each once: "
+                         "as they are, the motion goes in steps",
+                         "%s: %.0f %% of the frames repeat all markers of the one before", path,
+                         100.0 * n / r->n_frames);
+    }
 }
 
 /* How far most markers leave, from frame k - 1 to k, the way that they take before and after: the
@@ -151,5 +182,6 @@ void mhi_believe_markers(const mhi_run *run, const mhe_description *d, const mhi
             "%s: %.0f %% of the frames have no marker", path, 100.0 * n_empty / r->n_frames);
     }
     check_still(path, d, r, findings);
+    check_steps(path, d, r, findings);
     check_jump(path, d, r, findings);
 }

@@ -72,6 +72,8 @@ mhe_status mhi_calibration_solve(mhi_calibration *calibration, mhe_error *err);
 mhe_status mhi_calibration_search(mhi_calibration *c, mhi_ocp *ocp, const mhe_solver_ops *solver,
                                   void *self, mhe_solution *s, mhe_error *err);
 
+int32_t mhi_calibration_is_lost(const mhe_solve_info *info); /* 1: it has no result of its own */
+
 /* choose.c: the plan's entries as numbers, and which number of the model each belongs to. */
 mhe_status mhi_calibration_choose(mhi_calibration *c, mhe_error *err);
 /* Number of a muscle (body) now; where it is not estimated: 1 of a factor, else 0. */

@@ -256,20 +256,11 @@ static mhe_status take_solution(mhi_calibration *c, problem *p, mhe_error *err) 
     const ptrdiff_t x = (ptrdiff_t)(f->n_intervals + 1) * f->n_x,
                     u = (ptrdiff_t)f->n_intervals * f->n_u;
     p->s = (mhe_solution){.size = sizeof p->s};
-    struct {
-        double **array;
-        ptrdiff_t n;
-    } wanted[] = {{&p->s.x, x},          {&p->s.u, u},        {&p->s.lambda, x},
-                  {&p->s.zx_lower, x},   {&p->s.zx_upper, x}, {&p->s.zu_lower, u},
-                  {&p->s.zu_upper, u},   {&p->s.p, c->n},     {&p->s.zp_lower, c->n},
-                  {&p->s.zp_upper, c->n}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&c->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&p->s.x, x},          {&p->s.u, u},        {&p->s.lambda, x},
+                              {&p->s.zx_lower, x},   {&p->s.zx_upper, x}, {&p->s.zu_lower, u},
+                              {&p->s.zu_upper, u},   {&p->s.p, c->n},     {&p->s.zp_lower, c->n},
+                              {&p->s.zp_upper, c->n}};
+    return MHI_TAKE_ROOMS(&c->arena, rooms, err);
 }
 
 /* Bounds of a node. Activations follow excitations that have bounds, so that behind a first node
@@ -330,21 +321,26 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
 /* What was found, and how well it is known. */
 static mhe_status take_result(mhi_calibration *c, problem *p, mhe_error *err) {
     const mhe_covariance out = {.size = sizeof out, .node = 0, .pp = c->covariance};
-    mhe_status status =
-        p->solver->covariance == NULL ? MHE_OK : p->solver->covariance(p->self, &out, err);
+    int32_t known = p->solver->covariance != NULL && !mhi_calibration_is_lost(&c->info);
+    mhe_status status = known ? p->solver->covariance(p->self, &out, err) : MHE_OK;
+    if (status == MHE_E_NUMERIC) { /* values, though nothing says how well they are known */
+        known = 0;
+        status = MHE_OK;
+    }
     for (int32_t i = 0; i < c->n && status == MHE_OK; i++) {
         mhi_estimated *e = &c->list[i];
         e->value = p->s.p[i] * e->unit;
         const double margin = 1e-4 * (e->upper - e->lower);
         e->at_bound = e->value < e->lower + margin || e->value > e->upper - margin;
-        e->sd = p->solver->covariance == NULL ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
+        e->sd = !known ? NAN : e->unit * sqrt(c->covariance[i * c->n + i]);
         e->informed =
             e->at_bound || !(e->sd > 0.95 * e->prior_sd) || fabs(e->value - e->mean) > e->prior_sd;
         if (e->at_bound) {
             e->sd = 0;
         }
         for (int32_t j = 0; j < c->n; j++) {
-            c->covariance[i * c->n + j] *= e->unit * c->list[j].unit;
+            c->covariance[i * c->n + j] =
+                known ? c->covariance[i * c->n + j] * e->unit * c->list[j].unit : NAN;
         }
     }
     return status;

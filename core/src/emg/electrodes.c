@@ -220,11 +220,12 @@ void mhi_electrodes_push(mhi_electrodes *e, double time, const double *raw) {
     time += e->offset;
     if (e->n_pushed > 0) {
         const double since = time - e->times[(e->n_pushed - 1) % e->capacity];
-        if (!(since > 0)) {
+        if (!(since > 0) && since >= -KEPT) {
             return;
         }
-        const double steps = fmin(since * e->rate + 0.5, 1e9);
-        if (steps >= 2) { /* rows are missing */
+        const double steps = fmin(fabs(since) * e->rate + 0.5, 1e9);
+        e->n_pushed = since > 0 ? e->n_pushed : 0; /* a clock that was set back: it begins anew */
+        if (steps >= 2) {                          /* rows are missing */
             mhi_envelope_skip(e->envelope, (int32_t)steps - 1);
         }
     }
@@ -317,6 +318,19 @@ void mhi_electrodes_mean(const mhi_electrodes *e, double time, double span, doub
             emg[w->muscle] = n > 0 ? sum / n : NAN;
         }
     }
+}
+
+void mhi_electrodes_watch(const mhi_electrodes *e, const mhi_run *run, const char *source,
+                          const mhe_host *host) {
+    mhe_error err = {0};
+    double *peaks = calloc((size_t)e->n_channels + 1, sizeof *peaks);
+    for (int32_t i = 0; i < e->n_channels && peaks != NULL; i++) {
+        peaks[i] = fmax(e->peaks[i], 1); /* rest so far says nothing; of a number and NaN: 1 */
+    }
+    if (peaks != NULL && mhi_electrodes_check_peaks(run, source, peaks, host, &err) != MHE_OK) {
+        host->log(host, MHE_LOG_WARNING, err.text);
+    }
+    free(peaks);
 }
 
 int32_t mhi_electrodes_set_mvc(mhi_electrodes *e, const mhi_run *run, int32_t channel, double mvc) {

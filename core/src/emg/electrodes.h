@@ -36,8 +36,8 @@ void mhi_electrodes_close(mhi_electrodes *electrodes);
 void mhi_electrodes_tell(const mhi_electrodes *electrodes, const mhi_run *run, const char *source,
                          const mhe_host *host);
 
-/* The next sample, raw [n_labels], NaN where missing. Times that do not increase are passed over.
- * [hot] */
+/* The next sample, raw [n_labels], NaN where missing. Times that do not increase are passed over;
+ * a second and more before the last one it begins anew. [hot] */
 void mhi_electrodes_push(mhi_electrodes *electrodes, double time, const double *raw);
 /* Normalised EMG [n_muscles] at a time; NaN: no electrode, or nothing measured. Samples of the last
  * second are kept. [hot] */
@@ -49,6 +49,9 @@ void mhi_electrodes_mean(const mhi_electrodes *electrodes, double time, double s
  * the search begins anew. 0: it is no column. [any] */
 int32_t mhi_electrodes_peak(mhi_electrodes *electrodes, int32_t channel, int32_t reset,
                             double *peak);
+/* Tells the host of envelopes that are far too large so far. [cold] */
+void mhi_electrodes_watch(const mhi_electrodes *electrodes, const mhi_run *run, const char *source,
+                          const mhe_host *host);
 /* The EMG of a channel is relative to another maximum from the next sample on. 0: it is no column,
  * or the value is no maximum. [any] */
 int32_t mhi_electrodes_set_mvc(mhi_electrodes *electrodes, const mhi_run *run, int32_t channel,

@@ -26,41 +26,32 @@ static mhe_status create_variants(mhe_estimator *e, mhi_bands *b, mhe_error *err
 
 static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
     const ptrdiff_t n = b->gain.n_columns;
-    struct {
-        double **array;
-        ptrdiff_t n;
-    } wanted[] = {{&b->error, b->n_x * n},
-                  {&b->next, b->n_x * n},
-                  {&b->size, n},
-                  {&b->noise_share, b->n_m},
-                  {&b->skew, n},
-                  {&b->at, b->n_x * n},
-                  {&b->controls, b->n_u * n},
-                  {&b->row, n},
-                  {&b->marker_q, 3 * e->n_k * b->n_q},
-                  {&b->marker, 3 * e->n_k},
-                  {&b->force, b->n_m},
-                  {&b->worst, b->n_m},
-                  {&b->force_error, b->n_m * n},
-                  {&b->q, b->n_q},
-                  {&b->activation, b->n_m},
-                  {&b->force_sd, b->n_m},
-                  {&b->moment, b->n_q},
-                  {&b->moments[0].by_a, b->n_q * b->n_m},
-                  {&b->moments[0].by_q, b->n_q * b->n_q},
-                  {&b->moments[0].by_v, b->n_q * b->n_q},
-                  {&b->moments[1].by_a, b->n_q * b->n_m},
-                  {&b->moments[1].by_q, b->n_q * b->n_q},
-                  {&b->moments[1].by_v, b->n_q * b->n_q},
-                  {&b->value, b->n_x},
-                  {&b->slope, b->n_x + b->n_u}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&b->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&b->error, b->n_x * n},
+                              {&b->next, b->n_x * n},
+                              {&b->size, n},
+                              {&b->noise_share, b->n_m},
+                              {&b->skew, n},
+                              {&b->at, b->n_x * n},
+                              {&b->controls, b->n_u * n},
+                              {&b->row, n},
+                              {&b->marker_q, 3 * e->n_k * b->n_q},
+                              {&b->marker, 3 * e->n_k},
+                              {&b->force, b->n_m},
+                              {&b->worst, b->n_m},
+                              {&b->force_error, b->n_m * n},
+                              {&b->q, b->n_q},
+                              {&b->activation, b->n_m},
+                              {&b->force_sd, b->n_m},
+                              {&b->moment, b->n_q},
+                              {&b->moments[0].by_a, b->n_q * b->n_m},
+                              {&b->moments[0].by_q, b->n_q * b->n_q},
+                              {&b->moments[0].by_v, b->n_q * b->n_q},
+                              {&b->moments[1].by_a, b->n_q * b->n_m},
+                              {&b->moments[1].by_q, b->n_q * b->n_q},
+                              {&b->moments[1].by_v, b->n_q * b->n_q},
+                              {&b->value, b->n_x},
+                              {&b->slope, b->n_x + b->n_u}};
+    return MHI_TAKE_ROOMS(&b->arena, rooms, err);
 }
 
 static mhe_status check(const mhe_estimator *e, mhe_error *err) {

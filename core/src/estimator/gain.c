@@ -21,49 +21,40 @@ mhe_status mhi_gain_create(mhi_gain *g, mhi_arena *arena, mhe_error *err) {
     g->n_window = g->fresh + g->horizon * n_q;
     g->n_columns = g->n_window + g->horizon * n_q;
     const int32_t n_w = g->n_window;
-    struct {
-        double **array;
-        ptrdiff_t n;
-    } wanted[] = {{&g->here.A, n_x * n_x},
-                  {&g->here.B, n_x * n_u},
-                  {&g->here.hess_xx, n_x * n_x},
-                  {&g->here.hess_ux, n_u * n_x},
-                  {&g->here.hess_uu, n_u * n_u},
-                  {&g->here.force, n_x * n_m},
-                  {&g->here.pose_fixed, n_q * n_q},
-                  {&g->here.pose_fresh, n_q * n_q},
-                  {&g->here.control, n_m},
-                  {&g->known.A, n_x * n_x},
-                  {&g->known.B, n_x * n_u},
-                  {&g->known.force, n_x * n_m},
-                  {&g->known.K, n_u * n_x},
-                  {&g->known.ff, n_u * n_w},
-                  {&g->known.to_x, n_x * n_x},
-                  {&g->known.to_ff, n_x * n_w},
-                  {&g->known.u_x, n_u * n_x},
-                  {&g->known.u_ff, n_u * n_w},
-                  {&g->V, n_x * n_x},
-                  {&g->T, n_x * n_w},
-                  {&g->K, (ptrdiff_t)g->horizon * n_u * n_x},
-                  {&g->ff, (ptrdiff_t)g->horizon * n_u * n_w},
-                  {&g->to_x, n_x * n_x},
-                  {&g->to_ff, n_x * n_w},
-                  {&g->u_x, n_u * n_x},
-                  {&g->u_ff, n_u * n_w},
-                  {&g->VA, n_x * n_x},
-                  {&g->VB, n_x * n_u},
-                  {&g->BVA, n_u * n_x},
-                  {&g->M, n_u * n_u},
-                  {&g->BT, n_u * n_w},
-                  {&g->closed, n_x * n_x},
-                  {&g->more, n_x * n_w}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&g->here.A, n_x * n_x},
+                              {&g->here.B, n_x * n_u},
+                              {&g->here.hess_xx, n_x * n_x},
+                              {&g->here.hess_ux, n_u * n_x},
+                              {&g->here.hess_uu, n_u * n_u},
+                              {&g->here.force, n_x * n_m},
+                              {&g->here.pose_fixed, n_q * n_q},
+                              {&g->here.pose_fresh, n_q * n_q},
+                              {&g->here.control, n_m},
+                              {&g->known.A, n_x * n_x},
+                              {&g->known.B, n_x * n_u},
+                              {&g->known.force, n_x * n_m},
+                              {&g->known.K, n_u * n_x},
+                              {&g->known.ff, n_u * n_w},
+                              {&g->known.to_x, n_x * n_x},
+                              {&g->known.to_ff, n_x * n_w},
+                              {&g->known.u_x, n_u * n_x},
+                              {&g->known.u_ff, n_u * n_w},
+                              {&g->V, n_x * n_x},
+                              {&g->T, n_x * n_w},
+                              {&g->K, (ptrdiff_t)g->horizon * n_u * n_x},
+                              {&g->ff, (ptrdiff_t)g->horizon * n_u * n_w},
+                              {&g->to_x, n_x * n_x},
+                              {&g->to_ff, n_x * n_w},
+                              {&g->u_x, n_u * n_x},
+                              {&g->u_ff, n_u * n_w},
+                              {&g->VA, n_x * n_x},
+                              {&g->VB, n_x * n_u},
+                              {&g->BVA, n_u * n_x},
+                              {&g->M, n_u * n_u},
+                              {&g->BT, n_u * n_w},
+                              {&g->closed, n_x * n_x},
+                              {&g->more, n_x * n_w}};
+    return MHI_TAKE_ROOMS(arena, rooms, err);
 }
 
 /* Column of the posture's first direction at node k alone. */

@@ -6,27 +6,21 @@
 mhe_status mhi_output_create(mhi_output *o, const mhe_system *system, int32_t n_k, int32_t n_joints,
                              const mhi_channels *channels, mhi_arena *arena, mhe_error *err) {
     const int32_t n_q = system->n_q, n_m = system->n_m;
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {{&o->x, system->n_x},
-                  {&o->u, system->n_u},
-                  {&o->held, system->n_u},
-                  {&o->q, n_q},
-                  {&o->v, n_q},
-                  {&o->activation, n_m},
-                  {&o->excitation, n_m},
-                  {&o->force, n_m},
-                  {&o->moment, n_q},
-                  {&o->reaction, 6 * n_joints},
-                  {&o->input, system->n_w},
-                  {&o->residual, n_q},
-                  {&o->marker, 3 * n_k}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
+    const mhi_room rooms[] = {{&o->x, system->n_x},
+                              {&o->u, system->n_u},
+                              {&o->held, system->n_u},
+                              {&o->q, n_q},
+                              {&o->v, n_q},
+                              {&o->activation, n_m},
+                              {&o->excitation, n_m},
+                              {&o->force, n_m},
+                              {&o->moment, n_q},
+                              {&o->reaction, 6 * n_joints},
+                              {&o->input, system->n_w},
+                              {&o->residual, n_q},
+                              {&o->marker, 3 * n_k}};
+    if (MHI_TAKE_ROOMS(arena, rooms, err) != MHE_OK) {
+        return MHE_E_MEMORY;
     }
     o->tracked = MHI_TAKE(arena, mhe_tracked, channels->n);
     o->rows = MHI_TAKE(arena, mhi_output_row, channels->n);

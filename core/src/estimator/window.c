@@ -6,29 +6,20 @@
 mhe_status mhi_window_create(mhi_window *w, int32_t n, int32_t n_x, int32_t n_u, mhi_arena *arena,
                              mhe_error *err) {
     *w = (mhi_window){.n = n, .n_x = n_x, .n_u = n_u, .solution = {.size = sizeof w->solution}};
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {{&w->times, n + 1},
-                  {&w->solution.x, (n + 1) * n_x},
-                  {&w->solution.u, n * n_u},
-                  {&w->solution.lambda, n * n_x},
-                  {&w->solution.zx_lower, (n + 1) * n_x},
-                  {&w->solution.zx_upper, (n + 1) * n_x},
-                  {&w->solution.zu_lower, n * n_u},
-                  {&w->solution.zu_upper, n * n_u},
-                  {&w->left_u, n_u},
-                  {&w->guess_x, (n + 1) * n_x},
-                  {&w->guess_u, n * n_u},
-                  {&w->prior_centre, n_x},
-                  {&w->prior_weight, n_x}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&w->times, n + 1},
+                              {&w->solution.x, (n + 1) * n_x},
+                              {&w->solution.u, n * n_u},
+                              {&w->solution.lambda, n * n_x},
+                              {&w->solution.zx_lower, (n + 1) * n_x},
+                              {&w->solution.zx_upper, (n + 1) * n_x},
+                              {&w->solution.zu_lower, n * n_u},
+                              {&w->solution.zu_upper, n * n_u},
+                              {&w->left_u, n_u},
+                              {&w->guess_x, (n + 1) * n_x},
+                              {&w->guess_u, n * n_u},
+                              {&w->prior_centre, n_x},
+                              {&w->prior_weight, n_x}};
+    return MHI_TAKE_ROOMS(arena, rooms, err);
 }
 
 void mhi_window_append(mhe_estimator *e, double time, const double *const *values) {

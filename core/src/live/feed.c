@@ -7,12 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define WAITING 256   /* frames that may wait for their EMG; more are no longer in any window */
-#define SETTLE 1.0    /* s that the first frame waits for envelopes at most */
-#define FORGET 1e-6   /* s a sample by which the guess of a clock gives way: it may drift */
-#define SET_BACK 0.5  /* s: packets that overtake each other step back less */
-#define SET_AHEAD 2.0 /* s beyond the time that has passed: a packet before was not so late */
-#define ALIKE 1.0     /* s between shifts of streams of one clock */
+#define WAITING 256 /* frames that may wait for their EMG; more are no longer in any window */
+#define SETTLE 1.0  /* s that the first frame waits for envelopes at most */
+#define ALIKE 1.0   /* s between shifts of streams of one clock */
 
 mhe_status mhi_feed_open(mhi_feed *f, const mhe_host *host, const mhi_run *run,
                          const mhe_description *model, mhe_estimator *estimator, mhe_error *err) {
@@ -114,7 +111,7 @@ static mhe_status take_stream(mhi_feed *f, const mhi_packet *p, mhe_error *err) 
     }
     *in = fresh;
     keep_maxima(f, in);
-    f->clocks[in - f->inlets] = (mhi_feed_clock){.guess = INFINITY, .received = NAN};
+    mhi_clock_start(&f->clocks[in - f->inlets]);
     return MHE_OK;
 }
 
@@ -253,6 +250,7 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_
     if (ready) {
         f->n_estimates++;
         f->n_by_status[estimate.status >= 0 && estimate.status < 8 ? estimate.status : 7]++;
+        mhi_watch_markers(&f->setup, in->name, &estimate, &f->watch);
         if (f->taker != NULL) {
             f->taker(f->data, &estimate, f->start + estimate.time);
         }
@@ -262,7 +260,7 @@ static mhe_status push_frame(mhi_feed *f, mhi_inlet *in, double time, const mhe_
 
 /* Envelopes take a while to begin; the first frame waits for them, SETTLE at most. */
 static int32_t is_settled(mhi_feed *f, double host_time) {
-    if (!isfinite(f->begun)) {
+    if (!isfinite(f->begun) || host_time < f->begun) { /* first, or its clock was set back */
         f->begun = host_time;
     }
     for (int32_t i = 0; i < f->n_inlets && host_time - f->begun < SETTLE; i++) {
@@ -287,6 +285,7 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
     const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
     in->newest = smooth;
     in->n_samples++;
+    mhi_watch_stream(in, &f->setup);
     if (in->is_raw) { /* on the host's time: there may be no frame yet */
         mhi_electrodes_push(in->electrodes, smooth, values);
         return MHE_OK;
@@ -303,19 +302,6 @@ static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, cons
                      : mhe_estimator_measure(f->estimator, in->channel, time, in->row, err);
 }
 
-/* What to add to stamps. Where it was never measured: samples are never early, so the least delay
- * seen is taken for none. */
-static double offset_of(mhi_feed_clock *c, const mhi_packet *p) {
-    if (isfinite(p->offset)) {
-        return p->offset;
-    }
-    const double least = p->received - p->stamp[p->n - 1];
-    c->guess = isfinite(c->guess) && fabs(least - c->guess) < 5
-                   ? fmin(c->guess + FORGET * p->n, least)
-                   : least;
-    return c->guess;
-}
-
 /* The shift that another stream of the source has by now, where it is nearly this one: streams of
  * one clock stay aligned to the sample. */
 static double shift_of_source(const mhi_feed *f, const mhi_inlet *in, double shift) {
@@ -328,24 +314,25 @@ static double shift_of_source(const mhi_feed *f, const mhi_inlet *in, double shi
     return shift;
 }
 
-/* A sender's clock that is set while it runs: its samples go on as they arrive. Packets that come
- * late, or all at once after a pause, have stamps that go on by themselves. */
-static double follow_clock(mhi_feed *f, mhi_inlet *in, const mhi_packet *p) {
-    mhi_feed_clock *c = &f->clocks[in - f->inlets];
-    const double offset = offset_of(c, p), first = p->stamp[0] + offset;
-    const double step = first - c->time, passed = p->received - c->received;
-    if (isfinite(step) && isfinite(passed) && (step < -SET_BACK || step > passed + SET_AHEAD)) {
-        char text[300];
-        (void)snprintf(text, sizeof text,
-                       "stream '%.150s': its clock was set by %.3f s; it goes on as it arrives",
-                       in->name, step - passed);
-        warn(f, text);
-        f->n_clock_set++;
-        c->shift = shift_of_source(f, in, c->shift + passed - step);
-    }
-    c->received = p->received;
-    c->time = p->stamp[p->n - 1] + offset;
-    return offset + c->shift;
+/* Its clock was set by some seconds, which is told. */
+static void tell_set(mhi_feed *f, mhi_inlet *in, double seconds) {
+    mhi_clock *c = &f->clocks[in - f->inlets];
+    char text[300];
+    (void)snprintf(text, sizeof text,
+                   "stream '%.150s': its clock was set by %.3f s; it goes on as it arrives",
+                   in->name, seconds);
+    warn(f, text);
+    f->n_clock_set++;
+    c->shift = shift_of_source(f, in, c->shift);
+}
+
+static void tell_unused(const mhi_feed *f, const mhi_inlet *in) {
+    char text[300];
+    (void)snprintf(text, sizeof text,
+                   "stream '%.150s': its stamps do not go with the time (are they in s?); they are "
+                   "no longer used, its samples are taken as they come",
+                   in->name);
+    warn(f, text);
 }
 
 static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err) {
@@ -354,21 +341,29 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
         return MHE_OK;
     }
     in->lost = 0;
-    const double offset = p->stamp == NULL ? 0 : follow_clock(f, in, p);
-    const double period = in->rate > 0 ? 1 / in->rate : 0;
+    mhi_clock *clock = &f->clocks[in - f->inlets];
+    mhi_clock_packet work;
+    mhi_clock_begin(clock, p, in->rate, &work);
     mhe_status status = MHE_OK;
     int64_t before = f->n_frames;
     int32_t next = 0; /* grant */
     for (int32_t k = 0; k < p->n && status == MHE_OK; k++) {
         const mhe_grant *grant = next < p->n_grants ? &p->grants[next] : NULL;
-        const double time =
-            p->stamp == NULL ? p->received - (p->n - 1 - k) * period : p->stamp[k] + offset;
+        double set, time = mhi_clock_time(clock, &work, k, &set);
+        if (set != 0) {
+            const double shift = clock->shift;
+            tell_set(f, in, set);
+            time += clock->shift - shift;
+        }
         if (grant != NULL && grant->prepared == MHE_GRANT_STOPPED) {
             break; /* nothing came of it and of those after it */
         }
         status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, grant, err);
         next += f->n_frames > before;
         before = f->n_frames;
+    }
+    if (mhi_clock_end(clock, &work)) {
+        tell_unused(f, in);
     }
     return status == MHE_OK && in->is_raw ? serve_waiting(f, in, err) : status;
 }

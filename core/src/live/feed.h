@@ -6,7 +6,9 @@
 #ifndef MHI_FEED_H
 #define MHI_FEED_H
 
+#include "live/clocks.h"
 #include "live/inlet.h"
+#include "live/watch.h"
 
 #define MHI_FEED_INLETS 64
 #define MHI_FEED_MAXIMA 64 /* electrodes whose maximum can be looked for */
@@ -18,14 +20,6 @@ typedef void (*mhi_feed_taker)(void *data, const mhe_estimate *estimate, double 
 /* Told of every frame that was pushed, estimated or not: what it was granted. */
 typedef void (*mhi_feed_pusher)(void *data, const mhe_grant *grant, double host_time);
 
-/* A sender's clock, of a stream. */
-typedef struct mhi_feed_clock {
-    double guess;    /* s: least (received - stamp), where no offset is known; inf: none yet */
-    double shift;    /* s to add, since the clock was set while it ran */
-    double received; /* s, of the last packet; NaN: there was none */
-    double time;     /* s on this machine, of its last sample, without the shift */
-} mhi_feed_clock;
-
 typedef struct mhi_feed {
     mhi_inlet_setup setup;
     mhe_estimator_info info;
@@ -35,7 +29,8 @@ typedef struct mhi_feed {
     void *data;
     int32_t n_inlets;
     mhi_inlet inlets[MHI_FEED_INLETS];
-    mhi_feed_clock clocks[MHI_FEED_INLETS];
+    mhi_clock clocks[MHI_FEED_INLETS];
+    mhi_watch watch;
     int32_t driver;  /* inlet whose samples are the frames; -1: none yet */
     int32_t running; /* 0: samples are passed over */
     double begun;    /* s of CLOCK_MONOTONIC, first sample of the driver; NaN: none */

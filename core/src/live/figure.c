@@ -45,8 +45,13 @@ mhe_status mhi_figure_open(const mhe_host *host, const mhi_run *run,
                            const mhe_description *description, mhi_arena *arena, mhi_figure *f,
                            mhe_error *err) {
     *f = (mhi_figure){.description = description, .ops = run->model.plugin->ops};
+    mhe_host *quiet = MHI_TAKE(arena, mhe_host, 1);
+    if (quiet == NULL) {
+        return no_memory(err);
+    }
+    *quiet = mhi_host_quiet(host); /* the estimator's model has told all */
     const mhe_status status =
-        mhi_model_create(run->model.plugin, host, description, run->model.config, &f->self, err);
+        mhi_model_create(run->model.plugin, quiet, description, run->model.config, &f->self, err);
     if (status != MHE_OK) {
         return status;
     }

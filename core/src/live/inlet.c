@@ -247,6 +247,12 @@ static mhe_status match(const mhi_inlet_setup *s, const mhi_stream *about, mhi_i
 static mhe_status open_electrodes(const mhi_inlet_setup *s, const mhi_stream *about, mhi_inlet *in,
                                   mhe_error *err) {
     const int32_t n = s->run->emg.n_channels;
+    if (s->run->emg.process && !(about->rate > 0)) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "stream '%.150s' says no rate (it is irregular): the filters of raw EMG "
+                        "need one; let its program declare it",
+                        about->name);
+    }
     double *mvc = calloc((size_t)n + 1, sizeof *mvc);
     mhe_status status =
         mvc == NULL ? no_memory(err) : mhi_electrodes_mvc(s->run, s->model, mvc, err);

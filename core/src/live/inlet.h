@@ -29,6 +29,8 @@ typedef struct mhi_inlet {
     double newest;     /* s of CLOCK_MONOTONIC, its newest sample; -inf: none */
     int64_t n_samples; /* that came while the run ran */
     int64_t n_zero;
+    double began;             /* s, first of them */
+    int32_t watched;          /* it was judged (watch.h) */
     int32_t lost;             /* the source says that it sends nothing */
     char **missing, **unused; /* labels, for whoever looks; NULL-terminated */
 } mhi_inlet;

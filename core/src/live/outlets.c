@@ -16,7 +16,7 @@
 
 #define RING 1024  /* estimates; a power of two: ten seconds that a file may stall */
 #define HEAD 6     /* numbers of a record before the values */
-#define IDLE 0.001 /* s that a sink with a poll of its own may take for it */
+#define IDLE 0.001 /* s that a sink's own poll may take that cannot be woken */
 #define LOOK 0.05  /* s that others wait for an estimate at once */
 #define LATENCIES 4096
 
@@ -145,6 +145,15 @@ static const double *measured(const mhe_estimate *e, int32_t channel) {
     return NULL;
 }
 
+/* There is something in its ring, or it shall stop. Waits for nobody. */
+static void wake(outlet *s) {
+    if (s->ops->poll == NULL) {
+        (void)sem_post(&s->filled);
+    } else if (s->ops->wake != NULL) {
+        s->ops->wake(s->self);
+    }
+}
+
 void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
     if (o->n == 0) {
         return;
@@ -167,9 +176,7 @@ void mhi_outlets_give(mhi_outlets *o, const mhe_estimate *e, double host_time) {
     }
     for (int32_t i = 0; i < o->n; i++) {
         mhi_ring_put(o->outlets[i].ring, o->record);
-        if (o->outlets[i].ops->poll == NULL) {
-            (void)sem_post(&o->outlets[i].filled); /* waits for nobody */
-        }
+        wake(&o->outlets[i]);
     }
 }
 
@@ -228,7 +235,7 @@ static void *work(void *data) {
         } else if (stop) {
             break;
         } else if (s->ops->poll != NULL && status >= 0) {
-            status = s->ops->poll(s->self, IDLE, &err);
+            status = s->ops->poll(s->self, s->ops->wake == NULL ? IDLE : LOOK, &err);
         } else {
             wait_filled(s);
         }
@@ -329,7 +336,7 @@ void mhi_outlets_stop(mhi_outlets *o) {
     for (int32_t i = 0; i < o->n; i++) {
         outlet *s = &o->outlets[i];
         if (s->started) {
-            (void)sem_post(&s->filled);
+            wake(s);
             (void)pthread_join(s->thread, NULL);
         } else if (s->opened) {
             (void)s->ops->close(s->self, NULL);

@@ -30,10 +30,6 @@ struct mhi_anatomy {
     mhi_anatomy_context *contexts;
 };
 
-static void say_nothing(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text; /* the system's own model has told all */
-}
-
 int32_t mhi_insertion_is_fixed(const mhe_description *d, int32_t m) {
     const mhe_path *path = &d->paths[m];
     return path->n_points > 1 && path->points[path->n_points - 1].kind == MHE_POINT_FIXED &&
@@ -218,8 +214,7 @@ mhe_status mhi_anatomy_create(const mhi_system_setup *setup, mhi_arena *arena, m
     a->plugin = setup->model;
     a->ops = setup->model->ops;
     a->config = setup->model_config;
-    a->quiet = *setup->host;
-    a->quiet.log = say_nothing;
+    a->quiet = mhi_host_quiet(setup->host); /* the system's own model has told all */
     a->given = d;
     a->insertions = insertions;
     a->masses = masses;

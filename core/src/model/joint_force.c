@@ -40,10 +40,6 @@ static size_t doubles(int32_t n) {
     return sizeof(double) * (size_t)n;
 }
 
-static void say_nothing(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text; /* the system's own model has told all */
-}
-
 /* ---- what it is made of ---- */
 
 static const char *joint_name(const mhe_description *d, int32_t i) {
@@ -167,8 +163,7 @@ static mhe_status build(mhi_joint_force *j, const char *name, mhe_error *err) {
     if (status == MHE_OK) {
         status = keep_paths(j, err);
     }
-    j->quiet = *(const mhe_host *)s->host.data;
-    j->quiet.log = say_nothing;
+    j->quiet = mhi_host_quiet(s->host.data); /* the system's own model has told all */
     return status == MHE_OK ? mhi_model_create(s->model_plugin, &j->quiet, &j->loosened,
                                                s->model_config, &j->self, err)
                             : status;
@@ -208,38 +203,29 @@ static mhe_status take(mhi_joint_force_context *c, mhe_error *err) {
     const mhe_system *f = &c->joint->system->face;
     const int32_t n_q = f->n_q, n = n_q + AXES, n_p = c->joint->loosened.n_paths;
     const int32_t n_all = c->joint->system->n_paths;
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {{&c->q, n},
-                  {&c->v, n},
-                  {&c->a, n},
-                  {&c->vdot, n_q},
-                  {&c->vdot_q, n_q * n_q},
-                  {&c->vdot_v, n_q * n_q},
-                  {&c->vdot_a, n_q * f->n_a},
-                  {&c->vdot_r, n_q * f->n_r},
-                  {&c->vdot_z, n_q * f->n_z},
-                  {&c->mass, n * n},
-                  {&c->bias, n},
-                  {&c->length_q, n_p * n},
-                  {&c->length_qq, n_p * n * n},
-                  {&c->tau, n},
-                  {&c->tau_q, n * n},
-                  {&c->tau_v, n * n},
-                  {&c->given, n},
-                  {&c->given_q, n * n},
-                  {&c->tension, n_all},
-                  {&c->tension_l, n_all},
-                  {&c->tension_w, n_all},
-                  {&c->rows, AXES * (f->n_x + f->n_u)}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&c->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&c->q, n},
+                              {&c->v, n},
+                              {&c->a, n},
+                              {&c->vdot, n_q},
+                              {&c->vdot_q, n_q * n_q},
+                              {&c->vdot_v, n_q * n_q},
+                              {&c->vdot_a, n_q * f->n_a},
+                              {&c->vdot_r, n_q * f->n_r},
+                              {&c->vdot_z, n_q * f->n_z},
+                              {&c->mass, n * n},
+                              {&c->bias, n},
+                              {&c->length_q, n_p * n},
+                              {&c->length_qq, n_p * n * n},
+                              {&c->tau, n},
+                              {&c->tau_q, n * n},
+                              {&c->tau_v, n * n},
+                              {&c->given, n},
+                              {&c->given_q, n * n},
+                              {&c->tension, n_all},
+                              {&c->tension_l, n_all},
+                              {&c->tension_w, n_all},
+                              {&c->rows, AXES * (f->n_x + f->n_u)}};
+    return MHI_TAKE_ROOMS(&c->arena, rooms, err);
 }
 
 mhe_status mhi_joint_force_context_create(const mhi_joint_force *joint,

@@ -23,25 +23,16 @@ struct mhi_reactions {
 
 static mhe_status take(mhi_reactions *r, mhe_error *err) {
     const int32_t n = r->opened.n_coordinates, n_p = r->opened.n_paths;
-    struct {
-        double **array;
-        int32_t n;
-    } wanted[] = {{&r->q, n},
-                  {&r->v, n},
-                  {&r->a, n},
-                  {&r->vdot, n},
-                  {&r->tau, n},
-                  {&r->given, n},
-                  {&r->length_q, n_p * n},
-                  {&r->poses, 12 * r->opened.n_bodies},
-                  {&r->tension, n_p}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; i++) {
-        *wanted[i].array = MHI_TAKE(&r->arena, double, wanted[i].n);
-        if (*wanted[i].array == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-    }
-    return MHE_OK;
+    const mhi_room rooms[] = {{&r->q, n},
+                              {&r->v, n},
+                              {&r->a, n},
+                              {&r->vdot, n},
+                              {&r->tau, n},
+                              {&r->given, n},
+                              {&r->length_q, n_p * n},
+                              {&r->poses, 12 * r->opened.n_bodies},
+                              {&r->tension, n_p}};
+    return MHI_TAKE_ROOMS(&r->arena, rooms, err);
 }
 
 static mhe_status build(mhi_reactions *r, const mhi_system_setup *setup, mhe_error *err) {

@@ -308,6 +308,28 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
     return status;
 }
 
+/* A cost that calibration has no place for. */
+static mhe_status refuse(const mhi_ocp *ocp, int32_t term, const char *why, mhe_error *err) {
+    const mhe_status status =
+        mhe_fail(err, MHE_E_CONFIG,
+                 "costs.%d: %s reads %s. Leave it out here, and add it to the config that is left "
+                 "behind",
+                 term, ocp->terms[term].id, why);
+    if (err != NULL) {
+        err->part = MHE_PART_COST;
+        err->entry = term;
+    }
+    return status;
+}
+
+static int32_t reads_before(const mhi_term *t) {
+    int32_t before = 0;
+    for (int32_t s = 0; s < t->n_signals; s++) {
+        before |= t->layout.at[s] == MHE_AT_PREVIOUS;
+    }
+    return before;
+}
+
 /* What is estimated, and motions in a row. */
 static mhe_status set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     const uint32_t reactions = ((1u << MHI_MAX_REACTIONS) - 1) << MHI_SIGNAL_REACTION;
@@ -319,9 +341,10 @@ static mhe_status set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_
         return MHE_OK;
     }
     ocp->face.low_rank = NULL;
-    if (ocp->signals.n_carried > 0) {
-        return mhe_fail(err, MHE_E_CONFIG,
-                        "a cost reads the node before: calibration has no place for it");
+    for (int32_t i = 0; i < ocp->n_terms; i++) {
+        if (reads_before(&ocp->terms[i])) {
+            return refuse(ocp, i, "the node before: calibration has no place for that", err);
+        }
     }
     ocp->prior_at = MHI_TAKE(&ocp->arena, const double *, setup->n_intervals + 1);
     if (ocp->prior_at == NULL) {
@@ -337,16 +360,10 @@ static mhe_status set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_
     for (int32_t i = 0; i < ocp->n_terms; i++) {
         const uint32_t reads = mhi_term_reads(&ocp->terms[i]);
         if ((reads & forces) != 0 || ocp->terms[i].layout.jacobian != MHE_JACOBIAN_DIAGONAL) {
-            status = mhe_fail(err, MHE_E_CONFIG,
-                              "costs.%d: %s reads muscle forces or several signals at once: "
-                              "calibration has no derivatives of it by parameters. Leave it out "
-                              "here, and add it to the config that is left behind",
-                              i, ocp->terms[i].id);
-            if (err != NULL) {
-                err->part = MHE_PART_COST;
-                err->entry = i;
-            }
-            return status;
+            return refuse(ocp, i,
+                          "muscle forces or several signals at once: calibration has no "
+                          "derivatives of that by parameters",
+                          err);
         }
     }
     ocp->estimated = setup->estimated;

@@ -7,10 +7,14 @@
 
 #include <mhe/cost.h>
 #include <mhe/force.h>
+#include <mhe/host.h>
 #include <mhe/integrator.h>
 #include <mhe/model.h>
 #include <mhe/muscle.h>
 #include <mhe/solver.h>
+
+/* The host without a voice: for a model that is made once more, of which the first has told all. */
+mhe_host mhi_host_quiet(const mhe_host *host);
 
 /* As create() of the plugin's own table, which the header of its interface describes. [cold] */
 mhe_status mhi_model_create(const mhe_plugin *plugin, const mhe_host *host,

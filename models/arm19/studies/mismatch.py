@@ -67,7 +67,8 @@ def make_motions(bin_dir, out):
               "formulation: excitation\nintegrator: {plugin: mhe.integrator.rk, stages: 4, max_step: 0.015, activation_step: 1.7, "
               "tolerance: 5e-6}\nsolver: {plugin: mhe.solver.rti, preset: robust, tolerance: 1e-5, max_iterations: 300}\nsteps:\n" % ARM)
     write(os.path.join(out, "motions.yaml"), config + "".join(motion_steps(*motion) for motion in MOTIONS))
-    subprocess.run([os.path.join(bin_dir, "mhe-sim"), "reference", "motions.yaml", "--out", "motions"], cwd=out, check=True)
+    subprocess.run([os.path.join(bin_dir, "mhe-sim"), "reference", "motions.yaml", "--out", "motions"], cwd=out, check=True,
+                   stdout=subprocess.DEVNULL)
 
 
 def spoil(draw, errors, out, folder):

@@ -65,6 +65,32 @@ static int fading_gradient_of_ends(void *data, const double *ends, double *y) {
     return 0;
 }
 
+/* The worst errors of first and second derivatives, and the most that lengths differ by, in m. */
+typedef struct tally {
+    int met;
+    double first, second, most;
+} tally;
+
+static void count(tally *all, const scene *c, const double *g, const double *h, double most) {
+    scene at = *c;
+    all->met++;
+    all->most = fmax(all->most, most);
+    all->first = fmax(all->first, test_jacobian_error(fading_of_ends, &at, at.ends, 6, 1, g));
+    all->second =
+        fmax(all->second, test_jacobian_error(fading_gradient_of_ends, &at, at.ends, 6, 6, h));
+}
+
+/* As many as wanted were met, they differ by more than a millimetre, and derivatives are the
+ * length's own. */
+static void assert_own_derivatives(const tally *all, int wanted, const char *what) {
+    print_message("%d %s, first %.1e, second %.1e, by up to %.1f mm\n", all->met, what, all->first,
+                  all->second, 1e3 * all->most);
+    assert_int_equal(all->met, wanted);
+    assert_true(all->most > 1e-3);
+    assert_true(all->first < 1e-7);
+    assert_true(all->second < 1e-5);
+}
+
 /* Brings end p `out` outside the surface, along a line from the middle (of a torus, of its section
  * there). 0: done. */
 static int bring_near(scene *c, double out) {
@@ -97,35 +123,29 @@ static int bring_near(scene *c, double out) {
  * jump, and its derivatives are its own all the way. */
 static void letting_go_is_no_jump(void **state) {
     (void)state;
+    static const char *const kinds[] = {"let go of spheres", "of cylinders", "of ellipsoids",
+                                        "of tori"};
     uint64_t seed = 47;
     for (int32_t kind = MHE_OBSTACLE_SPHERE; kind <= MHE_OBSTACLE_TORUS; kind++) {
-        int met = 0;
-        double worst[2] = {0, 0}, excess = 0;
-        for (int trial = 0; trial < 20000 && met < 60; trial++) {
+        tally all = {0};
+        for (int trial = 0; trial < 20000 && all.met < 60; trial++) {
             scene c = random_scene(kind, &seed), at = c;
             wrap_string string;
-            double length, y[6], h[36];
+            double length, y[6], h[36], excess = 0;
             if (bring_near(&at, test_random(&seed, 3e-4, 2e-3)) != 0 ||
                 fading(&at, &length, y, h) == 0) {
                 continue;
             }
-            met++;
-            worst[0] = fmax(worst[0], test_jacobian_error(fading_of_ends, &at, at.ends, 6, 1, y));
-            worst[1] =
-                fmax(worst[1], test_jacobian_error(fading_gradient_of_ends, &at, at.ends, 6, 6, h));
             (void)bring_near(&c, 1e-9);
-            straight_derivatives(&c, &length, y);
+            double straight, unused[6];
+            straight_derivatives(&c, &straight, unused);
             if (solve(&c, &string) > 0) {
-                excess = fmax(excess, wrap_length(&string) - length);
+                excess = wrap_length(&string) - straight;
             }
-            assert_near(fading_length(&c), length, 1e-9);
+            count(&all, &at, y, h, excess);
+            assert_near(fading_length(&c), straight, 1e-9);
         }
-        print_message("kind %d: %d times, first %.1e, second %.1e, %.1f mm let go\n", (int)kind,
-                      met, worst[0], worst[1], 1e3 * excess);
-        assert_int_equal(met, 60);
-        assert_true(excess > 1e-3);
-        assert_true(worst[0] < 1e-7);
-        assert_true(worst[1] < 1e-5);
+        assert_own_derivatives(&all, 60, kinds[kind]);
     }
 }
 
@@ -158,9 +178,9 @@ static void slipping_off_is_no_jump(void **state) {
 static void turning_about_is_no_jump(void **state) {
     (void)state;
     uint64_t seed = 59;
-    int met = 0, turned = 0;
-    double worst[2] = {0, 0}, most = 0;
-    for (int trial = 0; trial < 20000 && met < 60; trial++) {
+    tally all = {0};
+    int turned = 0;
+    for (int trial = 0; trial < 20000 && all.met < 60; trial++) {
         scene c = random_scene(MHE_OBSTACLE_CYLINDER, &seed);
         wrap_string string, ways[2];
         double y[6], h[36], length;
@@ -172,18 +192,9 @@ static void turning_about_is_no_jump(void **state) {
         }
         assert_int_equal(fading(&c, &length, y, h), 1);
         wrap_both_ways(&c.surface, c.ends, c.ends + 3, &ways[0], &ways[1], &share);
-        met++;
-        most = fmax(most, fabs(wrap_length(&ways[0]) - wrap_length(&ways[1])));
-        worst[0] = fmax(worst[0], test_jacobian_error(fading_of_ends, &c, c.ends, 6, 1, y));
-        worst[1] =
-            fmax(worst[1], test_jacobian_error(fading_gradient_of_ends, &c, c.ends, 6, 6, h));
+        count(&all, &c, y, h, fabs(wrap_length(&ways[0]) - wrap_length(&ways[1])));
     }
-    print_message("%d turn, first %.1e, second %.1e, by up to %.1f mm\n", met, worst[0], worst[1],
-                  1e3 * most);
-    assert_int_equal(met, 60);
-    assert_true(most > 1e-3);
-    assert_true(worst[0] < 1e-7);
-    assert_true(worst[1] < 1e-5);
+    assert_own_derivatives(&all, 60, "turn");
     /* one end goes about the axis: the way round changes, and no step is a jump */
     scene c = {.surface = {.kind = MHE_OBSTACLE_CYLINDER,
                            .side_axis = 0,
@@ -214,9 +225,8 @@ static void turning_about_is_no_jump(void **state) {
 static void slipping_over_has_its_own_derivatives(void **state) {
     (void)state;
     uint64_t seed = 53;
-    int met = 0;
-    double worst[2] = {0, 0}, most = 0;
-    for (int trial = 0; trial < 200000 && met < 40; trial++) {
+    tally all = {0};
+    for (int trial = 0; trial < 200000 && all.met < 40; trial++) {
         scene c = random_scene(MHE_OBSTACLE_ELLIPSOID, &seed);
         wrap_string string, shortest, pass;
         double y[6], h[36], length;
@@ -236,19 +246,10 @@ static void slipping_over_has_its_own_derivatives(void **state) {
         double left = (length - wrap_length(&shortest)) / over;
         assert_true(left > -1e-9 && left < 1 + 1e-9);
         if (left > 0.05 && left < 0.95) {
-            met++;
-            most = fmax(most, over);
-            worst[0] = fmax(worst[0], test_jacobian_error(fading_of_ends, &c, c.ends, 6, 1, y));
-            worst[1] =
-                fmax(worst[1], test_jacobian_error(fading_gradient_of_ends, &c, c.ends, 6, 6, h));
+            count(&all, &c, y, h, over);
         }
     }
-    print_message("%d slip, first %.1e, second %.1e, by up to %.1f mm\n", met, worst[0], worst[1],
-                  1e3 * most);
-    assert_int_equal(met, 40);
-    assert_true(most > 1e-3);
-    assert_true(worst[0] < 1e-7);
-    assert_true(worst[1] < 1e-5);
+    assert_own_derivatives(&all, 40, "slip");
 }
 
 int main(void) {

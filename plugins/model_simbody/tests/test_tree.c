@@ -154,9 +154,6 @@ static void wrong_descriptions_are_refused(void **state) {
     c.bodies[2].joint_r[0] = 2;
     assert_refused(&c, "body 'c': a frame");
     make_chain(&c);
-    c.bodies[2].inertia[4] = -1;
-    assert_refused(&c, "body 'c': a moment of inertia");
-    make_chain(&c);
     c.bodies[0].motions = &wrong;
     wrong.coordinate = 2;
     assert_refused(&c, "body 'a': a motion of coordinate 2");

@@ -325,7 +325,7 @@ static double off(const program *p, double *worst) {
 
 static void run(const recipe *r) {
     double iterations = 0, warm_iterations = 0, most = 0, worst[4] = {0};
-    int failures = 0, fallbacks = 0, by_sets = 0;
+    int failures = 0, fallbacks = 0, by_sets = 0, updates = 0;
     for (int i = 0; i < r->n_programs; i++) {
         program p;
         seed = (uint64_t)i * 7919u + 17u;
@@ -349,6 +349,7 @@ static void run(const recipe *r) {
         }
         fallbacks += p.qp.fallbacks;
         by_sets += p.qp.programs - 1 - p.qp.fallbacks;
+        updates += p.qp.updates;
         if ((result != QP_SOLVED || !(far <= 1e-8)) && failures++ < 5) {
             print_message("%s %d: result %d after %d iterations; N %d, n_x %d (%d dense), n_u %d; "
                           "off by %g; own %g %g %g\n",
@@ -359,13 +360,15 @@ static void run(const recipe *r) {
         drop(&p);
     }
     print_message(
-        "%-16s %5d programs, %4.1f iterations (most %.0f), again warm %.1f, %d by sets, %d "
-        "not; violations %.1e %.1e %.1e\n",
+        "%-16s %5d programs, %4.1f iterations (most %.0f), again warm %.1f, %d by sets (%d by "
+        "updates), %d not; violations %.1e %.1e %.1e\n",
         r->name, r->n_programs, iterations / r->n_programs, most,
-        warm_iterations / (2 * r->n_programs), by_sets, fallbacks, worst[0], worst[1], worst[2]);
+        warm_iterations / (2 * r->n_programs), by_sets, updates, fallbacks, worst[0], worst[1],
+        worst[2]);
     assert_int_equal(failures, 0);
     if (r->separable) {
         assert_true(by_sets > r->n_programs / 4); /* of twice as many */
+        assert_true(r->first_free > 0.5 || updates > r->n_programs / 10);
     }
 }
 
