@@ -86,20 +86,49 @@ def emg_level(folder):
                   for m in study.levels("marker_noise", LEVELS)])
 
 
+def tracking_trials(folder, name):
+    """Trials at the high marker weight that track EMG: {(marker noise, EMG noise, co-contraction): {trial: row}}."""
+    out = {}
+    for r in Study(folder, name)["results"]:
+        if r["weight"] == "high" and r["emg_objective"] in TRACKING and r["counted"]:
+            out.setdefault((r["marker_noise"], r["emg_objective"], r["cocontraction"]), {})[r["trial"]] = r
+    return out
+
+
 def emg_noise(folder):
     """Force and joint angle errors of the paper's high marker weight and of EMG as a measurement, same seeds."""
     def means(name):
-        sums = {}
-        for r in Study(folder, name)["results"]:
-            if r["weight"] == "high" and r["emg_objective"] in TRACKING and r["counted"]:
-                sums.setdefault((r["marker_noise"], r["emg_objective"], r["cocontraction"]), []).append((r["force_n"], r["q_deg"]))
-        return {k: [sum(x[i] for x in v) / len(v) for i in (0, 1)] for k, v in sums.items()}
+        return {k: [sum(r[e] for r in v.values()) / len(v) for e in ("force_n", "q_deg")]
+                for k, v in tracking_trials(folder, name).items()}
     paper, own = means("noise"), means("emg-noise")
     rows = [[m, e, *(f"{number(paper[m, e, c][0])} -> {number(own[m, e, c][0])} ({100 * (own[m, e, c][0] / paper[m, e, c][0] - 1):+.0f} %)"
                      for c in LEVELS),
              f"{number(sum(paper[m, e, c][1] for c in LEVELS) / 4)} -> {number(sum(own[m, e, c][1] for c in LEVELS) / 4)}"]
             for m in LEVELS for e in TRACKING]
     return table(["marker noise", "EMG noise", *(f"force, co-contraction {c} (N)" for c in LEVELS), "joint angles (deg)"], rows)
+
+
+def emg_noise_verdict(folder):
+    """The same in a line each for forces (conditions with EMG noise) and joint angles (all), trial by trial."""
+    paper, own = tracking_trials(folder, "noise"), tracking_trials(folder, "emg-noise")
+    forces, angles = [], []
+    for k in own:
+        pairs = [(paper[k][t], own[k][t]) for t in own[k] if t in paper[k]]
+        by = [b["q_deg"] - a["q_deg"] for a, b in pairs]
+        mean = sum(by) / len(by)
+        error = (sum((d - mean) ** 2 for d in by) / max(1, len(by) - 1) / len(by)) ** 0.5
+        angles.append((mean, mean / error if error > 0 else 0, k))
+        if k[1] != "none":
+            forces.append((100 * (sum(b["force_n"] for _, b in pairs) / sum(a["force_n"] for a, _ in pairs) - 1), k))
+    forces.sort()
+    angles.sort()
+    at = "markers {}, EMG {}, co-contraction {}"
+    worse = [a for a in angles if a[0] > 0]
+    return table(["", "conditions", "from", "to", "how many"],
+                 [["force error", str(len(forces)), f"{forces[0][0]:.1f} %", f"{forces[-1][0]:.1f} % ({at.format(*forces[-1][1])})",
+                   f"at least 30 % less in {sum(f[0] <= -30 for f in forces)}"],
+                  ["joint angle error", str(len(angles)), f"{angles[0][0]:+.4f} deg", f"{angles[-1][0]:+.4f} deg ({at.format(*angles[-1][2])})",
+                   f"larger in {len(worse)}, t at most {max((a[1] for a in worse), default=0):.1f}"]])
 
 
 def limits(folder):
@@ -143,6 +172,7 @@ BLOCKS = {
     "verdicts-windows": verdicts("windows"), "verdicts-noise": verdicts("noise"), "rates": rates, "forces": forces,
     "angles": angles, "anova-force": anova("force"), "anova-angles": anova("angles"), "runs": runs, "subset": subset,
     "emg-level": emg_level, "limits": limits, "emg-noise": emg_noise,
+    "emg-noise-verdict": emg_noise_verdict,
     "mismatch": mismatch,
     "muscles-limits": muscles_limits,
 }

@@ -46,13 +46,38 @@ def reaction(folder, joint="glenohumeral", axis=AXIS):
     return sizes, angles
 
 
+def unit(v):
+    length = math.sqrt(sum(x * x for x in v))
+    return [x / length for x in v]
+
+
+def turned(degrees):
+    """The axis turned forward, back, up and down in the scapula (x and y of the file, as far as they are across it)."""
+    axis, across = unit(AXIS), []
+    for along in ([1, 0, 0], [0, 1, 0]):
+        for taken in [axis, *across]:
+            dot = sum(a * t for a, t in zip(along, taken))
+            along = [a - dot * t for a, t in zip(along, taken)]
+        across.append(unit(along))
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return {name: [c * a + s * sign * b for a, b in zip(axis, across[i])]
+            for name, i, sign in (("forward", 0, 1), ("back", 0, -1), ("up", 1, 1), ("down", 1, -1))}
+
+
+def within(folder, axis, limit=30):
+    """Share of the loaded frames whose reaction is within `limit` degrees of the axis."""
+    loaded = [a for s, a in zip(*reaction(folder, axis=axis)) if s > LOADED]
+    return sum(a <= limit for a in loaded) / max(1, len(loaded))
+
+
 def figures(folder, emg_of=None):
     folder = Path(folder)
     sizes, angles = reaction(folder)
     loaded = [a for s, a in zip(sizes, angles) if s > LOADED]
     torques, estimates = table(folder / "torques.sto"), table(folder / "estimates.sto")
     out = {"frames": len(estimates["time"]), "reaction_max": max(sizes), "loaded": len(loaded) / len(angles),
-           "within_30": sum(a <= 30 for a in loaded) / max(1, len(loaded)),
+           "within_30": within(folder, AXIS),
+           "within_30_turned": {str(d): {n: within(folder, a) for n, a in turned(d).items()} for d in (5, 10)},
            "angle_90": sorted(angles)[int(0.9 * len(angles))],
            "residuals": {n[len("residual_"):]: rms(v) for n, v in torques.items() if n.startswith("residual_")},
            "pushes": {n[len("actuator_"):]: 100 * sum(v) / len(v) for n, v in torques.items() if n.startswith("actuator_")},
@@ -93,6 +118,8 @@ def main():
         return
     print(f"reaction: {100 * out['loaded']:.0f} % of {out['frames']} frames above {LOADED} N (at most {out['reaction_max']:.0f} N), "
           f"{100 * out['within_30']:.1f} % of them within 30 deg of the glenoid's axis; 90 % of all within {out['angle_90']:.0f} deg")
+    for degrees, of in out["within_30_turned"].items():
+        print(f"the same with the axis turned by {degrees} deg:", ", ".join(f"{n} {100 * v:.1f} %" for n, v in of.items()))
     print("residual torques, N m RMS:", ", ".join(f"{n} {v:.1f}" for n, v in out["residuals"].items()))
     print("the thorax on the scapula, N mean:", ", ".join(f"{n} {v:.0f}" for n, v in out["pushes"].items()) or "no actuators")
     for group, of in out["girdle"].items():

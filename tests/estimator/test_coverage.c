@@ -37,9 +37,13 @@ static const condition conditions[] = {
 typedef struct count {
     double held, of;             /* forces */
     double by_muscle[N_M], each; /* of each muscle, and squares of ... */
+    double below[N_M];           /* bands that lie below the truth, of each muscle */
     double force[N_M], error[N_M], band[N_M];
-    double angles, of_angles;
+    double angles, of_angles, angle_squares;
     double squares, variance; /* of errors, of bands */
+    /* Of each muscle over the trials: sum and squares of the share held in one. What is wrong is
+     * the same all through a trial, so that trials are what counts as independent. */
+    double shares[N_M], share_squares[N_M], trials;
 } count;
 
 static void write_config(const condition *c, char *yaml, size_t size) {
@@ -78,6 +82,7 @@ static void compare(const mhe_estimate *e, const mhi_recording *r, const double 
         const double error = e->force[m] - truth[m];
         const int32_t held = fabs(error) <= 1.96 * e->force_sd[m];
         to->held += held;
+        to->below[m] += error < -1.96 * e->force_sd[m];
         to->by_muscle[m] += held;
         to->force[m] += truth[m] * truth[m];
         to->error[m] += error * error;
@@ -88,9 +93,29 @@ static void compare(const mhe_estimate *e, const mhi_recording *r, const double 
     to->of += N_M;
     to->each += 1;
     for (int32_t j = 0; j < N_Q; j++) {
-        to->angles += fabs(e->q[j] - r->reference.q[frame * N_Q + j]) <= 1.96 * e->q_sd[j];
+        const double error = e->q[j] - r->reference.q[frame * N_Q + j];
+        to->angles += fabs(error) <= 1.96 * e->q_sd[j];
+        to->angle_squares += error * error;
     }
     to->of_angles += N_Q;
+}
+
+/* Ends a trial, of which `before` is what was counted before it. */
+static void close_trial(const count *before, count *c) {
+    for (int32_t m = 0; m < N_M; m++) {
+        const double held = c->by_muscle[m] - before->by_muscle[m];
+        const double share = held / (c->each - before->each);
+        c->shares[m] += share;
+        c->share_squares[m] += share * share;
+    }
+    c->trials++;
+}
+
+/* Standard error of a muscle's share held, by how the trials differ. */
+static double standard_error(const count *c, int32_t m) {
+    const double mean = c->shares[m] / c->trials;
+    const double variance = fmax(0, c->share_squares[m] / c->trials - mean * mean);
+    return sqrt(variance / fmax(1, c->trials - 1));
 }
 
 /* One trial: the recording of the true arm, with a model that is wrong. */
@@ -101,6 +126,7 @@ static void run(const condition *c, const char *reference, int32_t seed, count *
     mhi_recording *truth = NULL, *seen = NULL;
     mhe_estimator *estimator = NULL;
     mhi_system_context *context = NULL;
+    const count before = *to;
     write_config(c, yaml, sizeof yaml);
     if (test_fixture_open(&f, yaml) != MHE_OK) {
         fail_msg("%s", f.err.text);
@@ -134,6 +160,7 @@ static void run(const condition *c, const char *reference, int32_t seed, count *
             compare(&e, truth, state.force, at, to);
         }
     }
+    close_trial(&before, to);
     mhi_system_context_free(context);
     mhe_estimator_close(estimator);
     mhi_recording_free(seen);
@@ -141,31 +168,40 @@ static void run(const condition *c, const char *reference, int32_t seed, count *
     test_fixture_close(&f);
 }
 
+/* Of a condition: forces held, the least and the largest muscle, angles held, errors; and of each
+ * muscle the share held with its standard error, how many misses are bands below the truth, RMS of
+ * force, error and band. */
+static void print_row(const condition *of, const count *c) {
+    double least = 1, most = 0;
+    for (int32_t m = 0; m < N_M; m++) {
+        least = fmin(least, c->by_muscle[m] / c->each);
+        most = fmax(most, c->by_muscle[m] / c->each);
+    }
+    (void)printf("%-14s %8.1f %8.1f %8.1f %8.1f %8.3f %10.2f %10.2f %7.0f\n", of->name,
+                 100 * c->held / c->of, 100 * least, 100 * most, 100 * c->angles / c->of_angles,
+                 57.29578 * sqrt(c->angle_squares / c->of_angles), sqrt(c->squares / c->of),
+                 sqrt(c->variance / c->of), c->trials);
+    for (int32_t m = 0; m < N_M; m++) {
+        (void)printf("    %2d %6.1f +- %4.1f %6.1f %8.1f %8.2f %8.2f\n", m,
+                     100 * c->by_muscle[m] / c->each, 100 * standard_error(c, m),
+                     100 * c->below[m] / c->each, sqrt(c->force[m] / c->each),
+                     sqrt(c->error[m] / c->each), sqrt(c->band[m] / c->each));
+    }
+    (void)fflush(stdout);
+}
+
 static void table(int32_t only, int32_t draws, char **references, int32_t n) {
-    (void)printf("%-14s %8s %8s %8s %8s %8s %10s %10s\n", "", "forces", "least", "most", "angles",
-                 "", "error (N)", "band (N)");
+    (void)printf("%-14s %8s %8s %8s %8s %8s %10s %10s %7s\n", "", "forces", "least", "most",
+                 "angles", "deg", "error (N)", "band (N)", "trials");
     const int32_t first = only < 0 ? 0 : only, end = only < 0 ? N_CONDITIONS : only + 1;
     for (int32_t i = first; i < end; i++) {
         count c = {0};
-        double least = 1, most = 0;
         for (int32_t draw = 0; draw < draws; draw++) {
             for (int32_t r = 0; r < n; r++) {
                 run(&conditions[i], references[r], 1000 * r + draw + 1, &c);
             }
         }
-        for (int32_t m = 0; m < N_M; m++) {
-            least = fmin(least, c.by_muscle[m] / c.each);
-            most = fmax(most, c.by_muscle[m] / c.each);
-        }
-        (void)printf("%-14s %8.1f %8.1f %8.1f %8.1f %8s %10.2f %10.2f\n", conditions[i].name,
-                     100 * c.held / c.of, 100 * least, 100 * most, 100 * c.angles / c.of_angles, "",
-                     sqrt(c.squares / c.of), sqrt(c.variance / c.of));
-        for (int32_t m = 0; m < N_M; m++) { /* of each: share held, force, error and band */
-            (void)printf("    %2d %6.1f %8.1f %8.2f %8.2f\n", m, 100 * c.by_muscle[m] / c.each,
-                         sqrt(c.force[m] / c.each), sqrt(c.error[m] / c.each),
-                         sqrt(c.band[m] / c.each));
-        }
-        (void)fflush(stdout);
+        print_row(&conditions[i], &c);
     }
 }
 

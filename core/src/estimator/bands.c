@@ -30,6 +30,7 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                               {&b->next, b->n_x * n},
                               {&b->size, n},
                               {&b->noise_share, b->n_m},
+                              {&b->skew, n},
                               {&b->at, b->n_x * n},
                               {&b->controls, b->n_u * n},
                               {&b->row, n},
@@ -169,12 +170,18 @@ static void move_on(mhi_bands *b) {
     b->next = swap;
 }
 
-static double length_of(const double *row, int32_t n) {
-    double sum = 0;
-    for (int32_t i = 0; i < n; i++) {
-        sum += row[i] * row[i];
+/* Standard deviation of a sum of independent causes, such that 1.96 of it hold 95 %. A cause with a
+ * long tail reaches further than its deviation says, but the skewness of a sum falls with the
+ * number of its causes, as its cubes say (the first term of Cornish and Fisher 1938,
+ * doi:10.2307/1400905). */
+static double reach_of(const mhi_bands *b, const double *row) {
+    double squares = 0, cubes = 0;
+    for (int32_t i = 0; i < b->gain.n_columns; i++) {
+        const double square = row[i] * row[i];
+        squares += square;
+        cubes += b->skew[i] * square * row[i];
     }
-    return sqrt(sum);
+    return squares > 0 ? sqrt(squares) + fabs(cubes) / squares : 0;
 }
 
 /* The row of activations of the output's node: states, or controls. */
@@ -206,7 +213,7 @@ static void measure_moments(mhi_bands *b) {
             add(b->row, b->at + i * n, by->by_q[j * n_q + i], n);
             add(b->row, b->at + (n_q + i) * n, by->by_v[j * n_q + i], n);
         }
-        b->moment[j] = length_of(b->row, n);
+        b->moment[j] = reach_of(b, b->row);
     }
 }
 
@@ -214,12 +221,12 @@ static void measure_moments(mhi_bands *b) {
 static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state *muscles) {
     const int32_t n = b->gain.n_columns, n_q = b->n_q;
     for (int32_t j = 0; j < n_q; j++) {
-        b->q[j] = length_of(b->at + j * n, n);
+        b->q[j] = reach_of(b, b->at + j * n);
     }
     for (int32_t m = 0; m < b->n_m; m++) { /* of the activation, and of the muscle's numbers */
         double *row = b->force_error + m * n;
         const double *a = activation_row(e, b, m);
-        b->activation[m] = length_of(a, n);
+        b->activation[m] = reach_of(b, a);
         memcpy(row, a, sizeof(double) * (size_t)n);
         row[b->n_m + m] += b->size[b->n_m + m];
     }
@@ -233,7 +240,7 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
             add(row, b->at + i * n, muscles->force_q[m * n_q + i], n);
             add(row, b->at + (n_q + i) * n, muscles->force_v[m * n_q + i], n);
         }
-        b->force_sd[m] = length_of(row, n);
+        b->force_sd[m] = reach_of(b, row);
     }
 }
 

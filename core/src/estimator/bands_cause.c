@@ -145,11 +145,17 @@ static double variation_of(const double *spread, int32_t m) {
 
 /* A share by which a number may be off is one of the true number; what is at hand is already off,
  * and where it is too small the truth is more than that share above it. Of e normal with deviation
- * sd, e / (1 + e) has 95 % of its values below what one sided quantiles of e make of it. */
-static double share_of_known(double sd) {
+ * sd, e / (1 + e) has 95 % of its values below what one sided quantiles of e make of it: so much
+ * further than sd it reaches, a share. */
+static double tail_of(double sd) {
     const double one_sided = 1.645, two_sided = 1.96;
     const double low = fmin(one_sided * sd, 0.8);
-    return fmax(sd, one_sided / two_sided * sd / (1 - low));
+    return fmax(0, one_sided / two_sided / (1 - low) - 1);
+}
+
+/* A part of a cause with its tail, as a share of the whole: third moments add up. */
+static double skew_of(double part, double tail, double all) {
+    return all > 0 ? tail * pow(part / all, 1.5) : 0;
 }
 
 static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
@@ -159,21 +165,23 @@ static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
     for (int32_t m = 0; m < b->n_m; m++) {
         const int32_t known = emg != NULL && !isnan(emg[m]);
         const double noise = b->emg.level * c->emg_noise * variation_of(spread, m);
-        const double gain = known ? share_of_known(c->emg_gain) * emg[m] : 0;
+        const double gain = known ? c->emg_gain * emg[m] : 0;
         const double all = known ? noise * noise + gain * gain + c->emg_floor * c->emg_floor
                                  : c->control * c->control;
         b->size[m] = sqrt(all);
         b->noise_share[m] = known && all > 0 ? noise * noise / all : 0;
+        b->skew[m] = known ? skew_of(gain * gain, tail_of(c->emg_gain), all) : 0;
     }
 }
 
 /* A muscle's force errors by its numbers, as one: they act through the force alone. */
 static void size_forces(mhe_estimator *e, mhi_bands *b, const double *activation,
                         const mhi_muscle_state *muscles) {
-    double *size = b->size + b->n_m;
+    double *size = b->size + b->n_m, *skew = b->skew + b->n_m;
+    const double off = b->config->max_isometric_force;
     for (int32_t m = 0; m < b->n_m; m++) {
-        const double strength = share_of_known(b->config->max_isometric_force) * muscles->force[m];
-        size[m] = strength * strength;
+        size[m] = off * muscles->force[m] * off * muscles->force[m];
+        skew[m] = size[m]; /* the part with a tail, until all are there */
     }
     for (int32_t i = 0; i < MHI_N_VARIANTS; i += 2) {
         memset(b->worst, 0, sizeof(double) * (size_t)b->n_m);
@@ -195,6 +203,7 @@ static void size_forces(mhe_estimator *e, mhi_bands *b, const double *activation
     for (int32_t m = 0; m < b->n_m; m++) {
         const double least = 1e-3 * e->description->muscles[m].max_isometric_force;
         const double slope = fmax(fabs(muscles->force_a[m]), least);
+        skew[m] = skew_of(skew[m], tail_of(off), size[m]);
         size[m] = sqrt(size[m]) / slope;
     }
 }

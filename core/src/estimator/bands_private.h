@@ -35,6 +35,8 @@ struct mhi_bands {
     double *next;                   /* the same, of the next window's */
     double *size;                   /* [columns] of each cause, in units of the gain's */
     double *noise_share;            /* [n_m] of noise in the square of an EMG cause */
+    double *skew;                   /* [columns] how much further than `size` a cause reaches where
+                                     * it is alone, a share */
     double *at;                     /* [n_x x columns] error of the output's node */
     double *controls;               /* [n_u x columns] of node 0; then of the output's node */
     double *row;                    /* [columns] */
