@@ -24,7 +24,7 @@ static const mhe_option emg_noise_options[] = {
         "The same as a share of how far all markers were from the estimates so far (RMS of "
         "a coordinate); the larger counts."),
     MHE_OPT_REAL(
-        struct emg_noise_config, markers_offset, 1.2, 0, 10, "1",
+        struct emg_noise_config, markers_offset, 1.5, 0, 10, "1",
         "Where joint velocities are measured (data.rates), in the place of markers_misfit: a share "
         "of how far markers were from the postures nearest to them (RMS of a coordinate)."),
     MHE_OPT_REAL(
@@ -42,7 +42,7 @@ static const mhe_option emg_noise_options[] = {
                  "Standard deviation of residual torques, where the problem has them."),
     MHE_OPT_REAL(struct emg_noise_config, qdot, 30, 1e-6, 1e6, "rad/s",
                  "Standard deviation about 0 of joint velocities."),
-    MHE_OPT_REAL(struct emg_noise_config, rates, 0.1, 1e-6, 1e6, "rad/s",
+    MHE_OPT_REAL(struct emg_noise_config, rates, 0.05, 1e-6, 1e6, "rad/s",
                  "Standard deviation of joint velocities where they are measured (data.rates)."),
 };
 
