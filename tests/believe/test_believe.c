@@ -169,7 +169,7 @@ static void a_copied_column_is_told(void **state) {
     expect(r, MHI_FINDING_NOTE, "columns that are the same to the last digit: C as A");
     assert_int_equal(r->findings.n, 1);
     r->emg[20 * MUSCLES] += 1e-12;
-    r->findings.n = 0;
+    mhi_findings_free(&r->findings);
     assert_int_equal(check_emg(r), MHE_OK);
     assert_int_equal(r->findings.n, 0);
     free_rig(r);
