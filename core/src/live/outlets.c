@@ -244,11 +244,15 @@ static void *work(void *data) {
             tell(s, err.text);
         }
     }
+    return NULL;
+}
+
+/* Not by its own thread: until that has ended, others may wake the sink. */
+static void close_one(outlet *s) {
     mhe_error err = {0};
     if (s->ops->close(s->self, &err) != MHE_OK) {
         tell(s, err.text);
     }
-    return NULL;
 }
 
 /* ---- start and stop ---- */
@@ -338,8 +342,9 @@ void mhi_outlets_stop(mhi_outlets *o) {
         if (s->started) {
             wake(s);
             (void)pthread_join(s->thread, NULL);
-        } else if (s->opened) {
-            (void)s->ops->close(s->self, NULL);
+        }
+        if (s->opened) {
+            close_one(s);
         }
         if (s->self != NULL) {
             s->ops->destroy(s->self);
