@@ -7,9 +7,9 @@
  *
  *     create -> open -> take ... take, poll ... -> close -> destroy
  *
- * Threads: one thread, the sink's own, calls take and poll; open has returned before it begins, close
- * is called when it has ended, both by the thread that begins and ends the run. wake: any, between
- * open and close.
+ * Threads: one thread, the sink's own, calls take and poll; open has returned before it begins,
+ * close is called when it has ended, both by the thread that begins and ends the run. wake: any,
+ * between open and close.
  */
 #ifndef MHE_SINK_H
 #define MHE_SINK_H
