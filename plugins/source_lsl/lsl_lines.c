@@ -4,7 +4,7 @@
  * Outlets of liblsl before 1.14 do not wake for a sample: for each connection a thread looks once a
  * millisecond whether there is one (consumer_queue::pop_sample). A sample therefore waits for half
  * a millisecond in the mean, on each connection for another time. Of two connections the faster
- * one waits a third of a millisecond, of three a quarter.
+ * one waits a third of a millisecond, of four a fifth.
  *
  * All connections carry the same samples in the same order. Each remembers the stamps of samples
  * that others gave before it. The main one gives what nobody gave yet, whatever happens to the

@@ -352,7 +352,7 @@ static const mhe_option lsl_options[] = {
                  "The library's file; without: the system's, else the one beside the plugin."),
     MHE_OPT_REAL(struct lsl_config, buffer, 10, 1, 3600, "s",
                  "What the library keeps while nobody reads."),
-    MHE_OPT_INT(struct lsl_config, connections, 3, 1, LSL_MOST_LINES, "1",
+    MHE_OPT_INT(struct lsl_config, connections, 4, 1, LSL_MOST_LINES, "1",
                 "Connections to each stream of frames; the first that has a sample gives it, since "
                 "senders with liblsl before 1.14 look once a millisecond for each of them."),
 };
