@@ -2,6 +2,7 @@
 /* route.c: routes of a description, their scratch, and their shares in the lengths. */
 #include "route.h"
 
+#include "mix.h"
 #include "numbers.h"
 #include "vector.h"
 
@@ -251,7 +252,7 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->newton, sizeof(double) * 2 * n_w * (2 * n_w + 1)},
                  {&out->gradient, sizeof(double) * n},
                  {&out->hessian, sizeof(double) * n * n},
-                 {&out->kept, sizeof(double) * 4 * n * (n + 1)},
+                 {&out->kept, sizeof(double) * MIX_LEVELS * MIX_VARIABLES * n * (n + 1)},
                  {&out->polynomial, sizeof(double) * n_f * (3 * POLYNOMIAL_POWERS + 1 + n_f)},
                  {&out->factors, sizeof(double *) * n_f},
                  {&out->shared, sizeof(shared_factors) * (size_t)set->n_numbers},
@@ -264,7 +265,9 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->state, sizeof(int32_t) * n_w},
                  {&out->blocker, sizeof(int32_t) * n_w},
                  {&out->order, sizeof(int32_t) * n_w},
-                 {&out->without, n_w}};
+                 {&out->without, n_w},
+                 {&out->out, n_w},
+                 {&out->whole, n_w}};
     size_t total = 64, n_parts = sizeof parts / sizeof parts[0];
     for (size_t i = 0; i < n_parts; i++) {
         parts[i].bytes = (parts[i].bytes + 15) / 16 * 16;

@@ -26,6 +26,8 @@ static const sweep sweeps[] = {
     {"MOBL_ARMS_41", "TRIlong", "shoulder_elv", 160, 175},
     {"MOBL_ARMS_41", "CORB", "shoulder_rot", 75, 80},
     {"ThoracoscapularShoulderModel", "TeresMajor", "scapula_elevation", -36, -31.7},
+    {"ThoracoscapularShoulderModel", "TeresMajor", "scapula_elevation", -89, -80},
+    {"ThoracoscapularShoulderModel", "TeresMajor", "scapula_elevation", -80, -74},
 };
 #define N_SWEEPS (sizeof sweeps / sizeof sweeps[0])
 
