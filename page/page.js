@@ -79,6 +79,7 @@ const late = { // the last 500
 };
 function showLink() {
   const part = late.parts(late.estimate), half = part(.5), most = part(.99), shown = late.parts(late.page)(.5), status = ["", "iteration limit", "deadline", "predicted", "begun again"][now.head[2]] || "";
+  if (half < 0) return say("latency", "not by the clock" + (status ? ", " + status : ""), "good"); // a recording that runs faster than it was made
   say("latency", `${half.toFixed(1)} ms (p99 ${most.toFixed(1)}), sent after ${shown.toFixed(0)} ms` + (status ? ", " + status : ""), half < 50 && now.head[2] < 3 ? "good" : "bad");
 }
 function showMissing() {

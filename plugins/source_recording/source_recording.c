@@ -39,6 +39,9 @@ typedef struct recording {
     int64_t next_arrival, next_grant, next_maximum;
     double offset; /* of the packet in work: stamps + offset is CLOCK_MONOTONIC; NaN: not known */
     double first;  /* s, earliest stamp */
+    double length; /* s, of all tracks with the period that a last sample stands for */
+    double zero;   /* s of CLOCK_MONOTONIC at which the recording began first */
+    double before; /* s of the recording that were played before it began again */
     double begun;  /* s of CLOCK_MONOTONIC at which `first` is due */
     int32_t started, ended, again;
 } recording;
@@ -78,6 +81,23 @@ static mhe_status read_file(recording *s, const char *path, int32_t kind, mhe_er
     return status;
 }
 
+/* From the earliest sample to where the next would be after the last: a recording that begins again
+ * goes on there. */
+static double length_of(const recording *s) {
+    double length = 1e-3;
+    for (int32_t i = 0; i < s->n_tracks; i++) {
+        const mhe_recorded_stream *r = s->tracks[i].stream;
+        if (r->n > 0) {
+            const double all = r->stamp[r->n - 1] - r->stamp[0];
+            const double period = r->about.rate > 0 ? 1 / r->about.rate
+                                  : r->n > 1        ? all / (double)(r->n - 1)
+                                                    : 0;
+            length = fmax(length, r->stamp[r->n - 1] + period - s->first);
+        }
+    }
+    return length;
+}
+
 static mhe_status lay_tracks(recording *s, mhe_error *err) {
     int32_t n = 0;
     for (int32_t i = 0; i < s->n_files; i++) {
@@ -107,6 +127,7 @@ static mhe_status lay_tracks(recording *s, mhe_error *err) {
             s->arrivals = s->files[i];
         }
     }
+    s->length = length_of(s);
     return MHE_OK;
 }
 
@@ -305,7 +326,7 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
     const double speed = s->config.speed;
     if (!s->started) {
         s->started = 1;
-        s->begun = now();
+        s->begun = s->zero = now();
     }
     while (!s->ended && (speed == 0 || now() < deadline)) {
         double stamp;
@@ -319,7 +340,8 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
                              "the recording begins again, as often as it ends (loop)");
             }
             s->again = 1;
-            s->begun = now();
+            s->begun += s->length / speed;
+            s->before += s->length;
             continue;
         }
         if (i < 0) {
@@ -336,12 +358,14 @@ static void play(recording *s, double deadline, const mhe_source_taker *taker) {
         track *t = &s->tracks[i];
         const double until = speed > 0 ? s->first + (now() - s->begun) * speed : INFINITY;
         const int32_t n = count_due(s, i, until);
-        /* at another speed the stamps are those of the recording, and run with it */
-        s->offset = speed > 0 ? s->begun - s->first : 0;
+        /* at another speed the stamps are those of the recording, and run with it; so does what
+         * is said of when they came */
+        s->offset = speed > 0 ? s->zero + s->before - s->first : 0;
+        const double last = t->stream->stamp[t->next + n - 1] + s->offset;
         const mhe_chunk chunk = {.size = sizeof chunk,
                                  .stream = t->slot,
                                  .n = n,
-                                 .received = speed > 0 ? now() : stamp,
+                                 .received = speed == 1 ? now() : last,
                                  .stamp = t->stream->stamp + t->next,
                                  .values =
                                      t->stream->values + t->next * t->stream->about.n_channels};

@@ -195,7 +195,7 @@ static void send_packet(rough *s, const packet *p, int32_t stream, const mhe_sou
     const mhe_chunk chunk = {.size = sizeof chunk,
                              .stream = stream,
                              .n = n,
-                             .received = now(),
+                             .received = s->begun + p->due, /* on the recording's time */
                              .stamp = stamp,
                              .values = values};
     if (values != NULL) {

@@ -4,6 +4,7 @@
  * a line and ends nothing. */
 #include "live_rig.h"
 
+#include <mhe/table.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -85,6 +86,34 @@ static void twice_as_fast_by_the_clock(void **state) {
     assert_true(live_rig_same("third", "fourth", "live_emg.sto"));
 }
 
+/* A recording that begins again goes on a period after its last sample: its times stay a line. */
+static void begun_again(void **state) {
+    (void)state;
+    char path[256], text[4096];
+    mhe_table *table = NULL;
+    mhe_table_info info = {.size = sizeof info};
+    mhe_error err = {0};
+    (void)snprintf(text, sizeof text, LIVE_CONFIG, MHE_TEST_SOURCE_DIR,
+                   "{plugin: mhe.source.recording, markers: " MHE_TEST_SOURCE_DIR
+                   "/models/arm19/demo_markers.trc, speed: 30, loop: true}");
+    rig = (live_rig){.name = "loop", .config = text, .seconds = 7};
+    live_rig_must_run(&rig);
+    mhe_free(rig.summary);
+    (void)snprintf(path, sizeof path, "%s/loop/live_q.sto", live_rig_folder());
+    if (mhe_table_read_signals(path, &table, &err) != MHE_OK ||
+        mhe_table_describe(table, &info, &err) != MHE_OK) {
+        fail_msg("%s", err.text);
+    }
+    assert_true(info.n_rows > 602); /* three times around */
+    for (int32_t k = 1; k < info.n_rows; k++) {
+        const double step = info.time[k] - info.time[k - 1];
+        if (!(step > 0.01 - 1e-6 && step < 0.01 + 1e-6)) {
+            fail_msg("%.9g s between rows %d and %d", step, (int)k - 1, (int)k);
+        }
+    }
+    mhe_table_close(table);
+}
+
 /* data.transform holds for streams as for files: five metres off, nothing fits the model. */
 static void markers_are_turned_into_the_models_frame(void **state) {
     (void)state;
@@ -150,6 +179,7 @@ int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(recorded_and_repeated),
         cmocka_unit_test(twice_as_fast_by_the_clock),
+        cmocka_unit_test(begun_again),
         cmocka_unit_test(markers_are_turned_into_the_models_frame),
         cmocka_unit_test(whose_markers),
         cmocka_unit_test(what_cannot_run),

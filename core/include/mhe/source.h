@@ -72,8 +72,9 @@ typedef struct mhe_chunk {
     uint32_t size;
     int32_t stream;  /* 0 .. count - 1 */
     int32_t n;       /* samples */
-    double received; /* s of CLOCK_MONOTONIC at which they were there; of a recording as fast as it
-                      * goes any other time: frames of it wait as long as they must */
+    double received; /* s of CLOCK_MONOTONIC at which they were there: their times are none later;
+                      * of a recording that does not go by the clock the time of its last sample:
+                      * frames of it wait as long as they must */
     const double *stamp;  /* [n], s of the sender's clock; NULL: it has none */
     const double *values; /* [n x n_channels], NaN: missing */
     int32_t n_grants;     /* frames that were estimated of these samples when they were recorded */

@@ -279,10 +279,10 @@ static int32_t is_settled(mhi_feed *f, double host_time) {
     return 1;
 }
 
-static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double host_time, const double *values,
+/* `smooth`: s of CLOCK_MONOTONIC, of the sample. */
+static mhe_status take_sample(mhi_feed *f, mhi_inlet *in, double smooth, const double *values,
                               const mhe_grant *grant, mhe_error *err) {
     const int32_t is_driver = in == &f->inlets[f->driver];
-    const double smooth = mhi_stamp_next(&in->stamp, host_time) - in->delay;
     in->newest = smooth;
     in->n_samples++;
     mhi_watch_stream(in, &f->setup);
@@ -358,7 +358,9 @@ static mhe_status take_samples(mhi_feed *f, const mhi_packet *p, mhe_error *err)
         if (grant != NULL && grant->prepared == MHE_GRANT_STOPPED) {
             break; /* nothing came of it and of those after it */
         }
-        status = take_sample(f, in, time, p->values + (ptrdiff_t)k * p->n_channels, grant, err);
+        time = mhi_stamp_next(&in->stamp, time, p->received, p->stamp == NULL || clock->unused);
+        status = take_sample(f, in, time - in->delay, p->values + (ptrdiff_t)k * p->n_channels,
+                             grant, err);
         next += f->n_frames > before;
         before = f->n_frames;
     }

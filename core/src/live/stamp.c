@@ -3,11 +3,16 @@
 
 #include <math.h>
 
-#define HALF_LIFE 30.0 /* s after which a stamp counts half */
-#define GAP 8.0        /* periods beyond the line, and ... */
-#define GAP_TIME 0.15  /* ... s, that are no jitter any more */
-#define JUMP 5.0       /* s: the clock was set, or the stream broke off */
-#define LEARNING 50    /* samples before the line is believed about gaps */
+#define BLOCK_TIME 0.25 /* s */
+#define LEARNED 0.5     /* s, and ... */
+#define LEARNING 50     /* samples, before the line is believed about its period and about gaps */
+#define SETTLED 2.0     /* s: until then ... */
+#define FASTEST 0.95    /* periods between samples: a stream that begins late catches up */
+#define GAP 8.0         /* periods beyond the line, and ... */
+#define GAP_TIME 0.15   /* ... s, that are no jitter any more */
+#define JUMP 5.0        /* s: the clock was set, or the stream broke off */
+#define CLOSEST 0.1     /* periods between two times that are handed out, and ... */
+#define SQUEEZED 1e-3   /* ... where samples came at once */
 
 void mhi_stamp_start(mhi_stamp *s, double rate) {
     *s = (mhi_stamp){.rate = rate > 0 ? rate : 0, .last = -INFINITY};
@@ -16,74 +21,126 @@ void mhi_stamp_start(mhi_stamp *s, double rate) {
 static void begin_line(mhi_stamp *s, double stamp) {
     s->n = 0;
     s->number = 0;
+    s->at = 0;
     s->start = stamp;
-    s->offset = 0;
     s->period = 1 / s->rate;
-    /* the first stamp may be late by tens of periods, the nominal rate wrong by a percent */
-    s->p00 = 1e4;
-    s->p01 = 0;
-    s->p11 = 1e-4;
+    s->n_blocks = 0;
+    s->n_late = 0;
+    s->learned = 0;
 }
 
 static double line_at(const mhi_stamp *s, double number) {
-    return s->start + s->offset + s->period * number;
+    return s->start + s->period * (number - s->at);
 }
 
-/* One step of recursive least squares with forgetting. The variance of a stamp is the unit of the
- * covariances. */
-static void follow(mhi_stamp *s, double error) {
-    const double keep = pow(0.5, 1 / (HALF_LIFE * s->rate)), x = s->number;
-    const double g0 = s->p00 + s->p01 * x, g1 = s->p01 + s->p11 * x;
-    const double gain = 1 / (keep + g0 + g1 * x);
-    s->offset += g0 * gain * error;
-    s->period += g1 * gain * error;
-    s->p00 = (s->p00 - g0 * g0 * gain) / keep;
-    s->p01 = (s->p01 - g0 * g1 * gain) / keep;
-    s->p11 = (s->p11 - g1 * g1 * gain) / keep;
+static const mhi_stamp_point *block(const mhi_stamp *s, int32_t i) { /* 0: the oldest */
+    return &s->least[(s->newest + 1 + MHI_STAMP_BLOCKS - s->n_blocks + i) % MHI_STAMP_BLOCKS];
 }
 
-/* Numbers are counted from the newest sample on, so that they stay small however long it runs. */
-static void shift_origin(mhi_stamp *s) {
-    const double n = s->number;
-    s->start = line_at(s, n);
-    s->offset = 0;
-    s->p00 += n * (2 * s->p01 + n * s->p11);
-    s->p01 += n * s->p11;
-    s->number = 0;
+static double slope(const mhi_stamp_point *a, const mhi_stamp_point *b) {
+    return (b->stamp - a->stamp) / (b->number - a->number);
 }
 
-double mhi_stamp_next(mhi_stamp *s, double stamp) {
+/* The hull's edge over the middle of the blocks. */
+static void fit(mhi_stamp *s) {
+    int32_t hull[MHI_STAMP_BLOCKS], n = 0;
+    for (int32_t i = 0; i < s->n_blocks; i++) { /* Andrew's monotone chain */
+        while (n > 1 && slope(block(s, hull[n - 2]), block(s, hull[n - 1])) >=
+                            slope(block(s, hull[n - 1]), block(s, i))) {
+            n--;
+        }
+        hull[n++] = i;
+    }
+    const double first = block(s, 0)->number, span = block(s, s->n_blocks - 1)->number - first;
+    if (n < 2 || span < LEARNED * s->rate || span < LEARNING) {
+        return;
+    }
+    int32_t k = 1;
+    while (k < n - 1 && block(s, hull[k])->number < first + span / 2) {
+        k++;
+    }
+    const mhi_stamp_point *a = block(s, hull[k - 1]), *b = block(s, hull[k]);
+    const double least = span < SETTLED * s->rate ? FASTEST / s->rate : 0.01 / s->rate;
+    s->learned |= slope(a, b) >= least;
+    s->period = fmax(slope(a, b), least);
+    s->at = b->number;
+    s->start = b->stamp;
+}
+
+/* Keeps the sample if it is the earliest of its block. A block that is whole is part of the line.
+ */
+static void keep(mhi_stamp *s, double stamp) {
+    const mhi_stamp_point point = {s->number, stamp};
+    mhi_stamp_point *least = &s->least[s->newest];
+    if (s->n_blocks > 0 && s->number - s->block < BLOCK_TIME * s->rate) {
+        if (stamp - least->stamp < s->period * (s->number - least->number)) {
+            *least = point;
+        }
+        return;
+    }
+    if (s->n_blocks > 1) {
+        fit(s);
+    }
+    s->newest = s->n_blocks == 0 ? 0 : (s->newest + 1) % MHI_STAMP_BLOCKS;
+    s->n_blocks += s->n_blocks < MHI_STAMP_BLOCKS;
+    s->least[s->newest] = point;
+    s->block = s->number;
+}
+
+/* A sample beyond the line, which is believed: are those before it missing, or is it late? Late
+ * ones wait somewhere and come at once, the first of them is the latest: if as many have come
+ * since, and some, they do not catch up. 1: it is late. */
+static int32_t is_late(mhi_stamp *s, double error, int32_t is_receipt) {
+    const double missing = floor(error / s->period + 0.5);
+    if (is_receipt && (double)++s->n_late <= missing + LEARNING) {
+        return 1;
+    }
+    s->n_late = 0;
+    s->number += missing;
+    s->n_gaps += (int64_t)missing;
+    return 0;
+}
+
+static void take(mhi_stamp *s, double stamp, int32_t is_receipt) {
+    const double beyond = fmax(GAP / s->rate, GAP_TIME);
+    const double error = s->n == 0 ? 0 : stamp - line_at(s, s->number + 1);
+    if (s->n == 0 || fabs(error) > JUMP || (error < -beyond && s->learned)) {
+        s->n_jumps += s->n > 0;
+        begin_line(s, stamp);
+        keep(s, stamp);
+        return;
+    }
+    s->number += 1;
+    if (!(error > beyond && s->learned)) {
+        s->n_late = 0;
+    } else if (is_late(s, error, is_receipt)) {
+        return;
+    }
+    const double early = line_at(s, s->number) - stamp;
+    s->start -= fmax(early, 0); /* until the line is fitted anew */
+    keep(s, stamp);
+}
+
+double mhi_stamp_next(mhi_stamp *s, double stamp, double received, int32_t is_receipt) {
     if (!isfinite(stamp)) {
         stamp = isfinite(s->last) ? s->last + (s->rate > 0 ? 1 / s->rate : 1e-6) : 0;
     }
     if (s->rate == 0) {
+        stamp = fmin(stamp, received);
         s->last = stamp > s->last ? stamp : nextafter(s->last, INFINITY);
         return s->last;
     }
-    const double expected = s->n == 0 ? stamp : line_at(s, s->number + 1);
-    double error = stamp - expected;
-    const double beyond = fmax(GAP / s->rate, GAP_TIME);
-    if (s->n == 0 || fabs(error) > JUMP || (error < -beyond && s->n > LEARNING)) {
-        s->n_jumps += s->n > 0;
-        begin_line(s, stamp);
-        error = 0;
-    } else {
-        s->number += 1;
-        if (error > beyond && s->n > LEARNING) {
-            const double missing = floor(error / s->period + 0.5);
-            s->number += missing;
-            s->n_gaps += (int64_t)missing;
-            error = stamp - line_at(s, s->number);
-        }
-        follow(s, error);
-    }
-    s->n++;
-    if (s->number > 1e4) {
-        shift_origin(s);
-    }
-    const double time = line_at(s, s->number);
-    const double least = s->last + 0.1 / s->rate;
     const int set_back = stamp < s->last - JUMP;
-    s->last = set_back || time > least ? time : least;
-    return s->last;
+    take(s, stamp, is_receipt);
+    s->n++;
+    double time = line_at(s, s->number);
+    if (!set_back) {
+        time = fmax(time, s->last + CLOSEST / s->rate);
+    }
+    time = time > received ? received : time;
+    if (!set_back) {
+        time = fmax(time, s->last + SQUEEZED / s->rate);
+    }
+    s->last = time;
+    return time;
 }
