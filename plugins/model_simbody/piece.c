@@ -26,7 +26,10 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
         into_frame(frame, before->a, guess.a);
         guess.arc = before->arc;
         guess.held = before->held;
+        guess.way = before->way;
+        guess.keeps = before->keeps;
     }
+    out->keeps = 0;
     int state =
         wrap_solve(&route->wraps[w].surface, ends[0], ends[1], before != NULL ? &guess : NULL, out);
     if (state > 0) {

@@ -93,15 +93,18 @@ typedef struct route_work {
     double *hopeless;     /* [n_wraps x 6]: ends between which none was found, NaN: none yet */
     int32_t *order;       /* [n_wraps]: those that may be on, in the order tried */
     int32_t n_order;
-    uint8_t *without;       /* [n_wraps]: 1: that one is left out */
-    uint8_t *out;           /* [n_wraps]: 1: of all courses; see release.c */
-    uint8_t *whole;         /* [n_wraps]: 1: it does not let go of a point; see release.c */
-    int32_t deepest;        /* 1: single strings let go of points, as where there is one */
-    int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */
-    int32_t lost;           /* the last wrap that held no string in a row; -1: none */
-    int32_t pushes, pushed; /* see wrap_try(): whether it may, whether it did */
-    course_joint *joints;   /* [n_wraps] */
-    course_piece *pieces;   /* [n_points + 2 n_wraps] */
+    uint8_t *without;         /* [n_wraps]: 1: that one is left out */
+    uint8_t *out;             /* [n_wraps]: 1: of all courses; see release.c */
+    uint8_t *whole;           /* [n_wraps]: 1: it does not let go of a point; see release.c */
+    int32_t deepest;          /* 1: single strings let go of points, as where there is one */
+    int32_t *blocker;         /* [n_wraps]: whose string ends inside the obstacle; -1: none */
+    int32_t lost;             /* the last wrap that held no string in a row; -1: none */
+    int32_t pushes, pushed;   /* see wrap_try(): whether it may, whether it did */
+    course_joint *joints;     /* [n_wraps] */
+    course_joint *row_joints; /* [2 n_wraps]: kept while rows are tightened, as the next two */
+    wrap_string *row_strings;
+    int32_t *row_states;
+    course_piece *pieces; /* [n_points + 2 n_wraps] */
     int32_t n_joints, n_pieces;
     double *newton; /* [(2 n_wraps) x (2 n_wraps + 1)] */
     strand_step *steps[2];
