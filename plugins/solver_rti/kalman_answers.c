@@ -57,27 +57,42 @@ CLONES static void sweep_simple(kalman *f, const qp_stage *stages, kalman_units 
     }
 }
 
+/* Rows of a triangle that are solved together; what they see of the others is a product. */
+#define AT_ONCE 4
+
 /* y = U^-T y, [n x 8] */
-CLONES static void substitute(int32_t n, const double *U, int32_t ld, const double *inverse,
-                              double *y) {
-    for (int32_t i = 0; i < n; i++) {
-        const eight row = AT(lanes(y, i)) * inverse[i];
-        PUT(lanes(y, i)) = row;
-        for (int32_t j = i + 1; j < n; j++) {
-            PUT(lanes(y, j)) -= U[i * ld + j] * row;
+CLONES static void substitute(const kernels *by, int32_t n, const double *U, int32_t ld,
+                              const double *inverse, double *y) {
+    for (int32_t i = 0; i < n; i += AT_ONCE) {
+        const int32_t end = i + AT_ONCE < n ? i + AT_ONCE : n;
+        double *rows = lanes(y, i);
+        by->product(end - i, L, i, -1, U + i, ld, y, L, rows, rows, L, 0);
+        for (int32_t r = i; r < end; r++) {
+            eight row = AT(lanes(y, r));
+            for (int32_t j = i; j < r; j++) {
+                row -= U[j * ld + r] * AT(lanes(y, j));
+            }
+            PUT(lanes(y, r)) = inverse[r] * row;
         }
     }
 }
 
 /* y = -U^-1 y */
-CLONES static void substitute_back(int32_t n, const double *U, int32_t ld, const double *inverse,
-                                   double *y) {
-    for (int32_t i = n - 1; i >= 0; i--) {
-        eight sum = AT(lanes(y, i));
-        for (int32_t j = i + 1; j < n; j++) {
-            sum += U[i * ld + j] * AT(lanes(y, j));
+CLONES static void substitute_back(const kernels *by, int32_t n, const double *U, int32_t ld,
+                                   const double *inverse, double *y) {
+    for (int32_t end = n; end > 0;) {
+        const int32_t i = (end - 1) / AT_ONCE * AT_ONCE;
+        double *rows = lanes(y, i);
+        by->product_rows(end - i, L, n - end, 1, U + i * ld + end, ld, lanes(y, end), L, rows, rows,
+                         L);
+        for (int32_t r = end - 1; r >= i; r--) {
+            eight row = AT(lanes(y, r));
+            for (int32_t j = r + 1; j < end; j++) {
+                row += U[r * ld + j] * AT(lanes(y, j));
+            }
+            PUT(lanes(y, r)) = -inverse[r] * row;
         }
-        PUT(lanes(y, i)) = -inverse[i] * sum;
+        end = i;
     }
 }
 
@@ -108,10 +123,12 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
         memcpy(m, z, ROW * (size_t)n);
         memcpy(y, block_of(units->g, k + 1, s->ld_z, s->n_u), ROW * (size_t)n);
         if (units->dense) {
-            substitute(n, kalman_U_of(f, k + 1), ld_d, kalman_of_d(f, f->U_inverse, k + 1), y);
+            substitute(s->kernels, n, kalman_U_of(f, k + 1), ld_d,
+                       kalman_of_d(f, f->U_inverse, k + 1), y);
         }
         s->kernels->product_rows(n, L, n, 1, kalman_U_of(f, k + 1), ld_d, z, L, y, y, L);
-        substitute(n, kalman_W_of(f, k + 1), f->ld_w, kalman_of_d(f, f->W_inverse, k + 1), y);
+        substitute(s->kernels, n, kalman_W_of(f, k + 1), f->ld_w,
+                   kalman_of_d(f, f->W_inverse, k + 1), y);
         s->kernels->product(width, L, n, -1, kalman_W_of(f, k + 1) + n, f->ld_w, y, L, m, m, L, 0);
     }
 }
@@ -132,7 +149,7 @@ CLONES static void sweep_back(kalman *f, const qp_stage *stages, kalman_units *u
             s->kernels->product_rows(n, L, n_x, 1, kalman_D_of(f, k), s->ld_x, eta, L, x, x, L);
             s->kernels->product_rows(n, L, n_x, 1, W + n, f->ld_w, eta, L, y, y, L);
         }
-        substitute_back(n, W, f->ld_w, kalman_of_d(f, f->W_inverse, k), y);
+        substitute_back(s->kernels, n, W, f->ld_w, kalman_of_d(f, f->W_inverse, k), y);
         memcpy(lanes(out, n), lanes(eta, n), ROW * (size_t)f->m);
         s->kernels->product(n, L, n, 1, U, f->ld_d, y, L, eta, out, L, 0);
         s->kernels->product(s->n_u, L, n, 1, stages[k - 1].F, s->ld_z, out, L, NULL, pull, L, 0);

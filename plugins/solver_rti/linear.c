@@ -176,7 +176,8 @@ typedef struct task {
 static mhe_stage_values values_wanted(const rti_worker *to, int32_t wanted, int32_t has_u,
                                       const qp_shape *shape, double *cost) {
     const int32_t has_p = shape->n_p > 0, separable = shape->separable;
-    mhe_stage_values out = {.size = sizeof out};
+    /* Workers' matrices are 0 at first, and nothing but evaluate() writes there. */
+    mhe_stage_values out = {.size = sizeof out, .hess_clear = 1};
     if (has_p && (wanted & RTI_DERIVATIVES)) {
         const int32_t costs = wanted & RTI_COSTS, dynamics = wanted & RTI_DYNAMICS;
         out.grad_p = costs ? to->grad_p : NULL;
