@@ -100,7 +100,7 @@ CLONES static void substitute_back(const kernels *by, int32_t n, const double *U
 CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units *units,
                                  int32_t from, double *w) {
     const qp_shape *s = f->shape;
-    const int32_t n = f->n, ld_d = f->ld_d, u = kalman_first_control(f);
+    const int32_t n = f->n, n_b = s->n_tied, ld_d = f->ld_d, u = kalman_first_control(f);
     const size_t none = ROW * (size_t)(from + 1);
     memset(units->x, 0, none * (size_t)s->ld_x);
     memset(units->z, 0, none * (size_t)ld_d);
@@ -111,6 +111,7 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
         const double *v = block_of(w, k, s->ld_z, 0), *x = block_of(units->x, k, s->ld_x, 0);
         double *m = block_of(units->x, k + 1, s->ld_x, 0), *z = units->row;
         double *y = block_of(units->z, k + 1, ld_d, 0);
+        const double *U = kalman_U_of(f, k + 1), *U_inverse = kalman_of_d(f, f->U_inverse, k + 1);
         memcpy(m, block_of(units->b, k, s->ld_x, 0), ROW * (size_t)s->n_x);
         for (int32_t j = 0; j < f->m; j++) {
             const double by_state = k > from ? closed[j] : 0;
@@ -123,10 +124,15 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
         memcpy(m, z, ROW * (size_t)n);
         memcpy(y, block_of(units->g, k + 1, s->ld_z, s->n_u), ROW * (size_t)n);
         if (units->dense) {
-            substitute(s->kernels, n, kalman_U_of(f, k + 1), ld_d,
-                       kalman_of_d(f, f->U_inverse, k + 1), y);
+            substitute(s->kernels, n_b, U, ld_d, U_inverse, y);
+            for (int32_t i = n_b; i < n; i++) {
+                PUT(lanes(y, i)) = U_inverse[i] * AT(lanes(y, i));
+            }
         }
-        s->kernels->product_rows(n, L, n, 1, kalman_U_of(f, k + 1), ld_d, z, L, y, y, L);
+        s->kernels->product_rows(n_b, L, n_b, 1, U, ld_d, z, L, y, y, L);
+        for (int32_t i = n_b; i < n; i++) {
+            PUT(lanes(y, i)) += U[i * (ld_d + 1)] * AT(lanes(z, i));
+        }
         substitute(s->kernels, n, kalman_W_of(f, k + 1), f->ld_w,
                    kalman_of_d(f, f->W_inverse, k + 1), y);
         s->kernels->product(width, L, n, -1, kalman_W_of(f, k + 1) + n, f->ld_w, y, L, m, m, L, 0);
@@ -137,7 +143,7 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
 CLONES static void sweep_back(kalman *f, const qp_stage *stages, kalman_units *units, double *w,
                               double *lambda) {
     const qp_shape *s = f->shape;
-    const int32_t n = f->n, n_x = s->n_x, u = kalman_first_control(f);
+    const int32_t n = f->n, n_b = s->n_tied, n_x = s->n_x, u = kalman_first_control(f);
     double *eta = units->eta, *pull = units->pull;
     memset(eta, 0, ROW * (size_t)n_x);
     for (int32_t k = s->N; k > 0; k--) {
@@ -151,8 +157,12 @@ CLONES static void sweep_back(kalman *f, const qp_stage *stages, kalman_units *u
         }
         substitute_back(s->kernels, n, W, f->ld_w, kalman_of_d(f, f->W_inverse, k), y);
         memcpy(lanes(out, n), lanes(eta, n), ROW * (size_t)f->m);
-        s->kernels->product(n, L, n, 1, U, f->ld_d, y, L, eta, out, L, 0);
-        s->kernels->product(s->n_u, L, n, 1, stages[k - 1].F, s->ld_z, out, L, NULL, pull, L, 0);
+        s->kernels->product(n_b, L, n_b, 1, U, f->ld_d, y, L, eta, out, L, 0);
+        for (int32_t i = n_b; i < n; i++) {
+            PUT(lanes(out, i)) = AT(lanes(eta, i)) + U[i * (f->ld_d + 1)] * AT(lanes(y, i));
+        }
+        s->kernels->product_rows(s->n_u, L, n, 1, kalman_FT_of(f, k - 1), f->ld_d, out, L, NULL,
+                                 pull, L);
         const double *beta = stages[k - 1].by_control + n;
         const double *closed = f->closed + (ptrdiff_t)(k - 1) * s->ld_x + n;
         const double *inverse = f->inverse + (ptrdiff_t)(k - 1) * s->ld_z;
