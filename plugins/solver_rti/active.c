@@ -87,13 +87,22 @@ static void set_constants(qp *q) {
     }
 }
 
+/* -> slope and gap at w; `lambda` NULL: 0. */
+static void find_residuals(qp *q, const double *lambda) {
+    if (q->recursion == QP_KALMAN) {
+        kalman_residuals(&q->kalman, q->stages, q->w, lambda, q->slope, q->gap);
+        return;
+    }
+    qp_slope(q->shape, q->stages, q->w, lambda, q->slope);
+    qp_gaps(q->shape, q->stages, q->w, q->gap);
+}
+
 /* The system of the present set, factorised and solved from w with multipliers `lambda` of 0. */
 static int32_t solve_set(qp *q, double regularisation) {
     const qp_shape *s = q->shape;
     set_constants(q);
     memset(q->lambda, 0, sizeof(double) * size_x(s));
-    qp_slope(s, q->stages, q->w, s->n_p > 0 ? q->lambda : NULL, q->slope);
-    qp_gaps(s, q->stages, q->w, q->gap);
+    find_residuals(q, s->n_p > 0 ? q->lambda : NULL);
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = 0; i < s->n_z; i++) {
             const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
@@ -157,8 +166,7 @@ static look see(qp *q, const qp_limits *limits) {
     look l = {0};
     memset(q->turned, 0, (size_t)s->n_x);
     memset(because, 0, sizeof(double) * (size_t)s->ld_x);
-    qp_slope(s, q->stages, q->w, q->lambda, q->slope);
-    qp_gaps(s, q->stages, q->w, q->gap);
+    find_residuals(q, q->lambda);
     for (size_t i = 0; i < size_x(s); i++) {
         l.feasibility = larger(l.feasibility, fabs(q->gap[i]));
     }

@@ -87,6 +87,11 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
 void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const double *b, double *w,
                   double *lambda);
 
+/* As qp_slope() and qp_gaps(), after kalman_begin(); `lambda` NULL: 0. By the matrices that
+ * solutions read: F itself would have to come to the cache beside them. */
+void kalman_residuals(const kalman *f, const qp_stage *stages, const double *w,
+                      const double *lambda, double *slope, double *gap);
+
 /* Solutions with the factors to n <= 8 units, of a first state that is fixed: w [size_z][8] and
  * lambda [size_x][8], those behind n without a meaning. */
 void kalman_answer(kalman *f, const qp_stage *stages, int32_t n, const kalman_unit *list, double *w,

@@ -176,3 +176,49 @@ void kalman_solve(kalman *f, const qp_stage *stages, const double *g, const doub
     sweep_back(f, stages, w, lambda);
     follow_simple(f, stages, b, w, lambda);
 }
+
+/* ---- what is left ---- */
+
+/* slope += F^T's share of the Lagrangian; gap = F w + b - x_next. */
+static void add_dynamics(const kalman *f, const qp_stage *stage, int32_t k, const double *w,
+                         const double *lambda, double *slope, double *gap) {
+    const qp_shape *s = f->shape;
+    const ptrdiff_t u = kalman_first_control(f);
+    const int32_t n = f->n, a = s->n_u + n;
+    const double *FT = kalman_FT_of(f, k), *next = w + s->ld_z + s->n_u;
+    const double *alpha = stage->by_state + n, *beta = stage->by_control + n;
+    for (int32_t i = 0; i < s->n_x; i++) {
+        gap[i] = stage->b[i] - next[i];
+    }
+    s->kernels->add_transposed(s->n_z, n, 1, FT, f->ld_d, w, gap);
+    for (int32_t j = 0; j < f->m; j++) {
+        gap[n + j] += alpha[j] * w[a + j] + beta[j] * w[u + j];
+    }
+    if (lambda == NULL) {
+        return;
+    }
+    s->kernels->add(s->n_z, n, -1, FT, f->ld_d, lambda, slope);
+    for (int32_t j = 0; j < f->m; j++) {
+        slope[a + j] -= alpha[j] * lambda[n + j];
+        slope[u + j] -= beta[j] * lambda[n + j];
+    }
+}
+
+void kalman_residuals(const kalman *f, const qp_stage *stages, const double *w,
+                      const double *lambda, double *slope, double *gap) {
+    const qp_shape *s = f->shape;
+    for (int32_t k = 0; k <= s->N; k++) {
+        const double *of_k = w + (ptrdiff_t)k * s->ld_z;
+        double *out = row_z(s, slope, k);
+        memcpy(out, stages[k].g, sizeof(double) * (size_t)s->ld_z);
+        qp_add_curvature(s, &stages[k], 1, of_k, out);
+        for (int32_t i = 0; i < s->n_x && k > 0 && lambda != NULL; i++) {
+            out[s->n_u + i] += lambda[(ptrdiff_t)(k - 1) * s->ld_x + i];
+        }
+        if (k < s->N) {
+            add_dynamics(f, &stages[k], k, of_k,
+                         lambda == NULL ? NULL : lambda + (ptrdiff_t)k * s->ld_x, out,
+                         row_x(s, gap, k));
+        }
+    }
+}

@@ -157,6 +157,33 @@ static void check_pattern(const uint8_t *pattern, const double *matrix, int32_t 
     }
 }
 
+/* Anything where something can stand. */
+static void fill_pattern(const uint8_t *pattern, double *matrix, int32_t n) {
+    for (int32_t i = 0; i < n; i++) {
+        matrix[i] = pattern[i] ? 7 : 0;
+    }
+}
+
+/* Hessians into arrays that hold 0 outside of their patterns, and numbers of before within. */
+static void check_kept(const point *p, const values *all) {
+    const int32_t n_x = p->problem->n_x, n_u = p->problem->n_u;
+    const int last = p->k == p->problem->n_intervals;
+    values v = take_values(n_x, n_u);
+    fill_pattern(p->problem->xx_pattern, v.xx, n_x * n_x);
+    fill_pattern(p->problem->ux_pattern, v.ux, last ? 0 : n_u * n_x);
+    fill_pattern(p->problem->uu_pattern, v.uu, last ? 0 : n_u * n_u);
+    const mhe_stage_values out = {
+        .size = sizeof out, .hess_xx = v.xx, .hess_ux = v.ux, .hess_uu = v.uu, .hess_clear = 1};
+    assert_int_equal(
+        p->problem->evaluate(p->problem, 0, p->k, p->z, last ? NULL : p->z + n_x, &out, NULL),
+        MHE_OK);
+    const size_t x = (size_t)n_x, w = (size_t)n_u, d = sizeof(double);
+    assert_memory_equal(v.xx, all->xx, d * x * x);
+    assert_memory_equal(v.ux, all->ux, d * w * x);
+    assert_memory_equal(v.uu, all->uu, d * w * w);
+    free_values(&v);
+}
+
 /* What is asked for alone is what is given with everything else. */
 static void check_parts(const point *p, const values *all) {
     const int32_t n_x = p->problem->n_x, n_u = p->problem->n_u;
@@ -192,6 +219,7 @@ static void check_node(test_fixture *f, int32_t k, uint64_t *seed) {
     random_point(f, seed, z);
     linearise(&at, &v);
     check_parts(&at, &v);
+    check_kept(&at, &v);
     double error = test_jacobian_error(cost_value, &at, z, last ? n_x : n_x + n_u, 1, v.grad);
     assert_true(error >= 0 && error < TOLERANCE);
     check_pattern(p->xx_pattern, v.xx, n_x * n_x);

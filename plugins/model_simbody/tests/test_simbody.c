@@ -157,8 +157,52 @@ static void simbody_carries_every_model(void **state) {
     assert_true(n >= 25);
 }
 
+/* A caller that keeps its arrays gets the same as one whose arrays are cleared for each call: what
+ * stood at a path's own coordinates goes, and nothing else is touched. */
+static void kept_arrays_hold_the_same_lengths(void **state) {
+    (void)state;
+    mhe_description *d = NULL;
+    assert_int_equal(mhi_model_read_unlocked(
+                         MHE_TEST_SOURCE_DIR "/models/gait10dof/gait10dof18musc.osim", &d, NULL),
+                     MHE_OK);
+    test_instance t;
+    test_open(&t, d, SIMBODY_DYNAMICS_RECURSIVE);
+    const size_t n = (size_t)d->n_coordinates, n_p = (size_t)d->n_paths, rows = n_p * n;
+    assert_true(n > 8); /* below, all is cleared */
+    double *fresh = numbers(rows * (1 + n)), *kept = numbers(rows * (1 + n)), *q = numbers(2 * n);
+    uint8_t *pattern = calloc(rows, 1);
+    assert_non_null(pattern);
+    assert_int_equal(t.ops->path_pattern(t.self, pattern, NULL), MHE_OK);
+    for (int trial = 0; trial < 3; trial++) {
+        for (size_t i = 0; i < n; i++) {
+            q[i] = 0.3 * sin((double)(1 + 7 * i) + 3 * trial);
+        }
+        for (size_t i = 0; i < rows; i++) {
+            const size_t p = i / n;
+            kept[i] = pattern[i] ? 7 : 0;
+            for (size_t j = 0; j < n; j++) {
+                kept[rows + i * n + j] = pattern[i] && pattern[p * n + j] ? 7 : 0;
+            }
+        }
+        const mhe_kinematics all = {
+            .size = sizeof all, .length_q = fresh, .length_qq = fresh + rows};
+        const mhe_kinematics own = {
+            .size = sizeof own, .length_q = kept, .length_qq = kept + rows, .lengths_clear = 1};
+        assert_int_equal(t.ops->kinematics(t.context, q, q + n, &all, NULL), MHE_OK);
+        assert_int_equal(t.ops->kinematics(t.context, q, q + n, &own, NULL), MHE_OK);
+        assert_memory_equal(kept, fresh, sizeof *kept * rows * (1 + n));
+    }
+    free(pattern);
+    free(fresh);
+    free(kept);
+    free(q);
+    test_close(&t);
+    mhi_description_free(d);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(kept_arrays_hold_the_same_lengths),
         cmocka_unit_test(simbody_carries_every_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
