@@ -321,6 +321,17 @@ void course_lay(const path_route *route, const path_pose *pose, const double *nu
     }
 }
 
+void course_drop(const path_route *route, int32_t w, route_work *work) {
+    stops_remove(work, w);
+    work->state[w] = WRAP_NONE;
+    for (int32_t k = 0; k < route->n_wraps; k++) {
+        work->blocker[k] = -1;
+    }
+    wraps_insert(route, work);
+    pieces_make(route, work);
+    strings_renew(route, work);
+}
+
 int course_touches(const path_route *route, int32_t w, route_work *work) {
     (void)wrap_insert(route, w, work);
     return work->state[w] > 0;

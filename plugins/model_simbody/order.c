@@ -90,8 +90,8 @@ static int course_try(const path_route *route, const path_pose *pose, const doub
             work->order[work->n_order++] = w;
         }
     }
+    course_lay(route, pose, numbers, work);
     do {
-        course_lay(route, pose, numbers, work);
         idle = route->n_wraps > 1 ? order_about(route, work) : -1;
         if (idle < 0 && work->n_joints > 0) {
             idle = joints_tighten(route, work);
@@ -99,7 +99,13 @@ static int course_try(const path_route *route, const path_pose *pose, const doub
         idle = idle < 0 ? order_idle(work) : idle;
         if (idle >= 0) {
             work->lost = work->n_joints > 0 ? idle : work->lost;
+            int off = work->n_joints > 0 && work->state[idle] == WRAP_NONE;
             order_bar(work, idle);
+            if (off) { /* it only ceased to touch: the others stay */
+                course_drop(route, idle, work);
+            } else {
+                course_lay(route, pose, numbers, work);
+            }
         }
     } while (idle >= 0);
     return course_is_clear(route, work) ? 0 : -1;

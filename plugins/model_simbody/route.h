@@ -166,6 +166,9 @@ void course_obstacles(const path_route *route, const path_pose *pose, route_work
 void course_lay(const path_route *route, const path_pose *pose, const double *numbers,
                 route_work *work);
 
+/* Takes wrap w off the course, and lays the others from where they are. */
+void course_drop(const path_route *route, int32_t w, route_work *work);
+
 /* Whether wrap w, that is not on the course, would be if it were tried (which leaves the course
  * of no use). */
 int course_touches(const path_route *route, int32_t w, route_work *work);
