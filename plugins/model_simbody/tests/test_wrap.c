@@ -266,12 +266,58 @@ static void touching_is_no_jump(void **state) {
     }
 }
 
+static int length_of_first_end(void *data, const double *end, double *y) {
+    scene c = *(const scene *)data;
+    wrap_string string;
+    memcpy(c.ends, end, 3 * sizeof *end);
+    int state = solve(&c, &string);
+    *y = state > 0 ? wrap_length(&string) : NAN;
+    return state > 0 ? 0 : -1;
+}
+
+/* Points of muscles are often put onto an ellipsoid, where they are but for rounding. */
+static void ends_on_an_ellipsoid_have_strings(void **state) {
+    (void)state;
+    uint64_t seed = 61;
+    int tried = 0, none = 0, studied = 0;
+    double first = 0;
+    for (int trial = 0; trial < 20000 && tried < 500; trial++) {
+        scene c = random_scene(MHE_OBSTACLE_ELLIPSOID, &seed);
+        wrap_string string;
+        double y[6], square = 0, off = 1 + test_random(&seed, 0, 1e-9);
+        c.surface.size[1] *= trial % 2 ? 3 : 1;
+        for (int i = 0; i < 3; i++) {
+            square += c.ends[3 + i] * c.ends[3 + i] / c.surface.size[i] / c.surface.size[i];
+        }
+        for (int i = 0; i < 3; i++) {
+            c.ends[3 + i] *= off / sqrt(square);
+        }
+        int needs = solve(&c, &string);
+        if (needs == WRAP_NONE || needs == WRAP_INSIDE) {
+            continue;
+        }
+        tried++;
+        none += needs == WRAP_UNSOLVED;
+        if (needs > 0 && studied < 100 && string.straight[0] > 0.01 && string.arc > 0.01) {
+            gradient(&string, y);
+            first = fmax(first, test_jacobian_error(length_of_first_end, &c, c.ends, 3, 1, y));
+            studied++;
+        }
+    }
+    print_message("%d of %d are not found, first %.1e\n", none, tried, first);
+    assert_int_equal(tried, 500);
+    assert_true(none <= 10);
+    assert_int_equal(studied, 100);
+    assert_true(first < 1e-7);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(spheres_and_cylinders_have_a_closed_form),
         cmocka_unit_test(beads_find_no_shorter_way),
         cmocka_unit_test(derivatives_are_those_of_the_length),
         cmocka_unit_test(touching_is_no_jump),
+        cmocka_unit_test(ends_on_an_ellipsoid_have_strings),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -16,7 +16,7 @@
 #define SAMPLES 4 /* of an arc's length */
 #define TRIED 3   /* strings solved exactly at most */
 #define NEAR 0.03 /* of the length: planes that are not worse than that may hold the shortest */
-#define OUTSIDE 1e-9
+#define ON 1e-5   /* of the squares that are 1 on the surface: an end that is meant to be there */
 #define PASSES 4
 #define SURE 0.6       /* twice what it begins to let go at (fade.h), by the fan's measure */
 #define PASS_TURN 0.15 /* rad */
@@ -72,6 +72,20 @@ static void contact_circle_of(const fan *f, contact_circle *c) {
     memcpy(c->size, f->size, sizeof c->size);
 }
 
+/* An end that is on the surface but for rounding is put above it, by so little (some nm) that
+ * nothing but the search for the string knows: there, a straight part of no length has no
+ * direction. */
+static void end_lift(const wrap_surface *surface, const double *at, double *out) {
+    double square = 0;
+    for (int i = 0; i < 3; i++) {
+        square += at[i] / surface->size[i] * (at[i] / surface->size[i]);
+    }
+    double scale = fabs(square - 1) < ON ? sqrt((1 + ON) / square) : 1;
+    for (int i = 0; i < 3; i++) {
+        out[i] = scale * at[i];
+    }
+}
+
 /* WRAP_*: whether the straight line crosses the ellipsoid. */
 static int fan_of(const wrap_surface *surface, const double *p, const double *s, fan *f) {
     double d[3], foot[3];
@@ -81,7 +95,7 @@ static int fan_of(const wrap_surface *surface, const double *p, const double *s,
         f->s[i] = s[i] / surface->size[i];
         d[i] = f->s[i] - f->p[i];
     }
-    if (dot3(f->p, f->p) < 1 + OUTSIDE || dot3(f->s, f->s) < 1 + OUTSIDE) {
+    if (dot3(f->p, f->p) < 1 || dot3(f->s, f->s) < 1) {
         return WRAP_INSIDE;
     }
     f->length = sqrt(dot3(d, d));
@@ -264,8 +278,8 @@ static int fan_lowest(const fan_string *strings) {
     return lowest;
 }
 
-int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
-                   const wrap_string *guess, wrap_string *out) {
+static int string_of(const wrap_surface *surface, const double *p, const double *s,
+                     const wrap_string *guess, wrap_string *out) {
     fan f;
     fan_string strings[FAN];
     int needs = fan_of(surface, p, s, &f), axis = surface->side_axis;
@@ -292,6 +306,44 @@ int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s
     return shortest_of(surface, p, s, &f, strings, allowed, out) ? needs : WRAP_UNSOLVED;
 }
 
+static void exchange3(double *a, double *b, double sign) {
+    for (int i = 0; i < 3; i++) {
+        double x = sign * a[i];
+        a[i] = sign * b[i];
+        b[i] = x;
+    }
+}
+
+static void exchange(double *a, double *b) {
+    double x = *a;
+    *a = *b;
+    *b = x;
+}
+
+/* The same string from s to p. Its fields are those of the inverse, seen backwards. */
+static void string_reverse(wrap_string *string) {
+    exchange3(string->a, string->b, 1);
+    exchange3(string->t[0], string->t[1], -1);
+    exchange3(string->n[0], string->n[1], 1);
+    exchange(&string->straight[0], &string->straight[1]);
+    exchange(&string->field[0], &string->field[3]);
+}
+
+int wrap_ellipsoid(const wrap_surface *surface, const double *p_given, const double *s_given,
+                   const wrap_string *guess, wrap_string *out) {
+    double p[3], s[3];
+    end_lift(surface, p_given, p);
+    end_lift(surface, s_given, s);
+    int state = string_of(surface, p, s, guess, out);
+    if (state == WRAP_UNSOLVED) { /* it is aimed from p: from s it may be easier */
+        state = string_of(surface, s, p, NULL, out);
+        if (state > 0) {
+            string_reverse(out);
+        }
+    }
+    return state;
+}
+
 /* The highest string of the fan on the way from the k-th to the lowest one, in steps of `way`. */
 static int fan_top(const fan_string *strings, int k, int lowest, int way) {
     int top = k;
@@ -314,8 +366,11 @@ static int pass_of(const wrap_surface *surface, const double *p, const double *s
     return -1;
 }
 
-int wrap_slips(const wrap_surface *surface, const double *p, const double *s,
+int wrap_slips(const wrap_surface *surface, const double *p_given, const double *s_given,
                const wrap_string *held, wrap_string *shortest, wrap_string *pass) {
+    double p[3], s[3];
+    end_lift(surface, p_given, p);
+    end_lift(surface, s_given, s);
     fan f;
     fan_string strings[FAN];
     int all[FAN], k = 0, found = 0;

@@ -19,10 +19,11 @@
 #define MAX_NEWTON 12
 #define MAX_FIRED 16 /* strings tried: there are none where that does not do */
 #define MAX_CUTS 4
-#define NEAR 1e-3    /* miss, relative to the surface's size: from here on, fine steps */
-#define LONGEST 7.0  /* sizes: no string is longer on its surface */
-#define MAX_TURN 0.5 /* rad, sizes: longest step of Newton's method */
-#define SOLVED 1e-12 /* miss, relative to the surface's size */
+#define NEAR 1e-3     /* miss, relative to the surface's size: from here on, fine steps */
+#define MIRRORED 0.05 /* of the size: straight parts beyond which a string has passed its end */
+#define LONGEST 7.0   /* sizes: no string is longer on its surface */
+#define MAX_TURN 0.5  /* rad, sizes: longest step of Newton's method */
+#define SOLVED 1e-12  /* miss, relative to the surface's size */
 
 static void ellipsoid_shape(const double *size, const double *x, const double *t, const double *b,
                             surface_shape *out) {
@@ -335,7 +336,7 @@ int string_shoot(const wrap_surface *surface, const double *p, const double *s,
     double scale = surface_scale(surface), limit = SOLVED * scale;
     double arc = start->arc, accuracy = start->near ? FINE : COARSE, step[2];
     shot now;
-    int fired = 0;
+    int fired = 0, mirrored = 0;
     out->held = 0;
     out->other = 0;
     *turn = start->turn;
@@ -366,6 +367,15 @@ int string_shoot(const wrap_surface *surface, const double *p, const double *s,
         }
         if (done || !better) { /* not better: the digits end here, or no solution */
             int solved = done || (accuracy == FINE && before < 1e3 * limit);
+            if (solved && now.ahead <= 0 && now.ahead > -MIRRORED * scale && !mirrored) {
+                mirrored = 1; /* it has passed the end, which the line behind it meets */
+                arc += 2 * now.ahead;
+                if (string_fire(surface, p, s, start, *turn, arc, accuracy, out, &now) != 0) {
+                    return -1;
+                }
+                miss = hypot(now.miss[0], now.miss[1]);
+                continue;
+            }
             return solved && now.ahead > 0 && (now.spread > 0) == !start->passes && arc > -limit &&
                            arc < LONGEST * scale
                        ? 0
