@@ -42,7 +42,7 @@ static const mhe_option emg_noise_options[] = {
                  "Standard deviation of residual torques, where the problem has them."),
     MHE_OPT_REAL(struct emg_noise_config, qdot, 30, 1e-6, 1e6, "rad/s",
                  "Standard deviation about 0 of joint velocities."),
-    MHE_OPT_REAL(struct emg_noise_config, rates, 0.05, 1e-6, 1e6, "rad/s",
+    MHE_OPT_REAL(struct emg_noise_config, rates, 0.1, 1e-6, 1e6, "rad/s",
                  "Standard deviation of joint velocities where they are measured (data.rates)."),
 };
 

@@ -235,9 +235,10 @@ void rk_states_keep(const struct rk_context *c);
 void rk_states_chain(struct rk_context *c, double h);
 int rk_states_advance(struct rk_context *c);
 
-/* product.c: C [m x n] += A^T B with A [k x m], B [k x n]; row-major with rows of ld doubles. */
-void rk_product(int32_t m, int32_t n, int32_t k, const double *A, int32_t ld_a, const double *B,
-                int32_t ld_b, double *C, int32_t ld_c);
+/* product.c: C [m x n] = A^T B (`set`) or += A^T B with A [k x m], B [k x n]; row-major with rows
+ * of ld doubles. */
+void rk_product(int32_t m, int32_t n, int set, int32_t k, const double *A, int32_t ld_a,
+                const double *B, int32_t ld_b, double *C, int32_t ld_c);
 
 /* lu.c: a [n x n] row-major becomes its LU factors (0: singular); x [n] = A^-1 x; x [n x m],
  * row-major, = A^-1 x, = A^-T x. */

@@ -10,6 +10,7 @@
 #include "../clones.h"
 
 #include <math.h>
+#include <stddef.h>
 #include <string.h>
 
 /* Four doubles, wherever they lie. */
@@ -183,6 +184,34 @@ static int lengths_finite(const simbody_context *c, const mhe_kinematics *out) {
     return sum == 0;
 }
 
+/* Zeros for what the paths add up; length_q may be another array than that of `out`. */
+static void clear_lengths(const simbody_context *c, const mhe_kinematics *out, double *length_q) {
+    const size_t n_q = (size_t)c->tree->n_q, n_p = (size_t)c->tree->n_muscles;
+    const int own_only = out->size > offsetof(mhe_kinematics, lengths_clear) &&
+                         out->lengths_clear && n_q > FEW_COORDINATES && length_q == out->length_q;
+    if (!own_only) {
+        if (length_q != NULL) {
+            memset(length_q, 0, sizeof *length_q * n_p * n_q);
+        }
+        if (out->length_qq != NULL) {
+            memset(out->length_qq, 0, sizeof *out->length_qq * n_p * n_q * n_q);
+        }
+        return;
+    }
+    for (size_t p = 0; p < n_p; p++) {
+        for (int32_t i = c->own_start[p]; i < c->own_start[p + 1]; i++) {
+            const size_t row = p * n_q + (size_t)c->own[i];
+            if (length_q != NULL) {
+                length_q[row] = 0;
+            }
+            for (int32_t j = c->own_start[p]; j < c->own_start[p + 1] && out->length_qq != NULL;
+                 j++) {
+                out->length_qq[row * n_q + (size_t)c->own[j]] = 0;
+            }
+        }
+    }
+}
+
 /* Whatever of the outputs was asked for is finite. */
 static int results_finite(const simbody_context *c, const mhe_kinematics *out) {
     const tree *t = c->tree;
@@ -225,8 +254,10 @@ mhe_status simbody_kinematics(void *context, const double *q, const double *v,
     path_pose pose = {.r = c->r, .p = c->p, .slopes = c->slopes};
     if (out->length != NULL || out->length_q != NULL || out->length_qq != NULL) {
         int scratch = out->length_qq != NULL && out->length_q == NULL;
-        path_lengths(t, c->bundles, c->n_bundles, &pose, c->steps, out->length,
-                     scratch ? c->length_q : out->length_q, out->length_qq);
+        double *length_q = scratch ? c->length_q : out->length_q;
+        clear_lengths(c, out, length_q);
+        path_lengths(t, c->bundles, c->n_bundles, &pose, c->steps, out->length, length_q,
+                     out->length_qq);
         routes_lengths(t, c->routes, &pose, c->numbers, &c->route_work, out->length, out->length_q,
                        out->length_qq);
     }

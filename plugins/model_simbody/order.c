@@ -114,7 +114,7 @@ void course_without(const path_route *route, const path_pose *pose, const double
 
 void course_find(const path_route *route, const path_pose *pose, const double *numbers,
                  route_work *work) {
-    memset(work->without, 0, (size_t)route->n_wraps);
+    memcpy(work->without, work->out, (size_t)route->n_wraps);
     course_obstacles(route, pose, work);
     course_without(route, pose, numbers, work);
 }

@@ -257,15 +257,8 @@ CLONES static void bundle_lengths(const tree *t, const path_bundle *bundle, cons
 void path_lengths(const tree *t, const path_bundle *bundles, int32_t n_bundles,
                   const path_pose *pose, path_step *steps, double *length, double *length_q,
                   double *length_qq) {
-    size_t n_q = (size_t)t->n_q, n_m = (size_t)t->n_muscles;
     if (length != NULL) {
-        memcpy(length, t->fixed_length, sizeof *length * n_m);
-    }
-    if (length_q != NULL) {
-        memset(length_q, 0, sizeof *length_q * n_m * n_q);
-    }
-    if (length_qq != NULL) {
-        memset(length_qq, 0, sizeof *length_qq * n_m * n_q * n_q);
+        memcpy(length, t->fixed_length, sizeof *length * (size_t)t->n_muscles);
     }
     for (int32_t i = 0; i < n_bundles; i++) {
         bundle_lengths(t, &bundles[i], pose, steps, length, length_q, length_qq);

@@ -38,9 +38,9 @@ path_bundle *path_bundles(const tree *tree, int32_t *n);
 /* position [n_markers x 3] and position_q [3 n_markers x n_q]; NULL: not wanted. */
 void path_markers(const tree *tree, const path_pose *pose, double *position, double *position_q);
 
-/* length [n_muscles], length_q [n_muscles x n_q], length_qq [n_muscles x n_q x n_q]; NULL: not
- * wanted. A segment whose ends coincide has no direction and counts as length 0 with derivatives 0.
- * `steps` is scratch of tree->max_chain. */
+/* length [n_muscles]; adds to length_q [n_muscles x n_q] and length_qq [n_muscles x n_q x n_q];
+ * NULL: not wanted. A segment whose ends coincide has no direction and counts as length 0 with
+ * derivatives 0. `steps` is scratch of tree->max_chain. */
 void path_lengths(const tree *tree, const path_bundle *bundles, int32_t n_bundles,
                   const path_pose *pose, path_step *steps, double *length, double *length_q,
                   double *length_qq);

@@ -26,7 +26,10 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
         into_frame(frame, before->a, guess.a);
         guess.arc = before->arc;
         guess.held = before->held;
+        guess.way = before->way;
+        guess.keeps = before->keeps;
     }
+    out->keeps = 0;
     int state =
         wrap_solve(&route->wraps[w].surface, ends[0], ends[1], before != NULL ? &guess : NULL, out);
     if (state > 0) {
@@ -40,10 +43,31 @@ int string_between(const path_route *route, int32_t w, const double *p, const do
     return state;
 }
 
+/* m = r m r^T */
+static void turn_back(const double *r, double *m) {
+    double half[9], transposed[9];
+    multiply3(r, m, half);
+    for (int i = 0; i < 9; i++) {
+        transposed[i] = r[i % 3 * 3 + i / 3];
+    }
+    multiply3(half, transposed, m);
+}
+
 double string_off(const path_route *route, int32_t w, const route_work *work, const double *at) {
     double x[3];
     into_frame(work->obstacles + 12 * w, at, x);
     return wrap_outside(&route->wraps[w].surface, x);
+}
+
+double string_off_derivatives(const path_route *route, int32_t w, const route_work *work,
+                              const double *at, double *g, double *h) {
+    const double *frame = work->obstacles + 12 * w;
+    double x[3];
+    into_frame(frame, at, x);
+    double off = wrap_outside_derivatives(&route->wraps[w].surface, x, g, h);
+    rotate3(frame, g, g);
+    turn_back(frame, h);
+    return off;
 }
 
 int string_clears(const path_route *route, int32_t w, const route_work *work, double *at) {
@@ -94,16 +118,6 @@ static int end_moves(const path_route *route, const course_piece *piece, int e) 
            route->points[piece->point[e]].place->link != route->wraps[piece->wrap].link;
 }
 
-/* m = r m r^T */
-static void turn_back(const double *r, double *m) {
-    double half[9], transposed[9];
-    multiply3(r, m, half);
-    for (int i = 0; i < 9; i++) {
-        transposed[i] = r[i % 3 * 3 + i / 3];
-    }
-    multiply3(half, transposed, m);
-}
-
 /* Length of a string that fades, with derivatives in ground; < 0: it does not fade. */
 static double faded_length(const path_route *route, const route_work *work,
                            const course_piece *piece, const double *const ends[2], double *g,
@@ -111,7 +125,8 @@ static double faded_length(const path_route *route, const route_work *work,
     const wrap_surface *surface = &route->wraps[piece->wrap].surface;
     const double *frame = work->obstacles + 12 * piece->wrap;
     const wrap_string *string = &work->strings[piece->wrap];
-    int moves[2] = {end_moves(route, piece, 0), end_moves(route, piece, 1)};
+    int alone = route->n_wraps < 2 || work->deepest; /* else see release.c */
+    int moves[2] = {alone && end_moves(route, piece, 0), alone && end_moves(route, piece, 1)};
     double p[3], s[3], transposed[9];
     if (!moves[0] && !moves[1] && surface->kind != MHE_OBSTACLE_CYLINDER && !string->held) {
         return -1;

@@ -2,6 +2,7 @@
 /* route.c: routes of a description, their scratch, and their shares in the lengths. */
 #include "route.h"
 
+#include "mix.h"
 #include "numbers.h"
 #include "vector.h"
 
@@ -251,12 +252,15 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->newton, sizeof(double) * 2 * n_w * (2 * n_w + 1)},
                  {&out->gradient, sizeof(double) * n},
                  {&out->hessian, sizeof(double) * n * n},
-                 {&out->kept, sizeof(double) * 4 * n * (n + 1)},
+                 {&out->kept, sizeof(double) * MIX_LEVELS * MIX_VARIABLES * n * (n + 1)},
                  {&out->polynomial, sizeof(double) * n_f * (3 * POLYNOMIAL_POWERS + 1 + n_f)},
                  {&out->factors, sizeof(double *) * n_f},
                  {&out->shared, sizeof(shared_factors) * (size_t)set->n_numbers},
                  {&out->strings, sizeof(wrap_string) * n_w},
                  {&out->joints, sizeof(course_joint) * n_w},
+                 {&out->row_joints, sizeof(course_joint) * 2 * n_w},
+                 {&out->row_strings, sizeof(wrap_string) * 2 * n_w},
+                 {&out->row_states, sizeof(int32_t) * 2 * n_w},
                  {&out->steps[0], sizeof(strand_step) * (size_t)set->n_steps},
                  {&out->steps[1], sizeof(strand_step) * (size_t)set->n_steps},
                  {&out->stops, sizeof(course_stop) * n_s},
@@ -264,7 +268,9 @@ mhe_status route_work_create(const route_set *routes, const route_set *other, ro
                  {&out->state, sizeof(int32_t) * n_w},
                  {&out->blocker, sizeof(int32_t) * n_w},
                  {&out->order, sizeof(int32_t) * n_w},
-                 {&out->without, n_w}};
+                 {&out->without, n_w},
+                 {&out->out, n_w},
+                 {&out->whole, n_w}};
     size_t total = 64, n_parts = sizeof parts / sizeof parts[0];
     for (size_t i = 0; i < n_parts; i++) {
         parts[i].bytes = (parts[i].bytes + 15) / 16 * 16;

@@ -93,17 +93,23 @@ typedef struct route_work {
     double *hopeless;     /* [n_wraps x 6]: ends between which none was found, NaN: none yet */
     int32_t *order;       /* [n_wraps]: those that may be on, in the order tried */
     int32_t n_order;
-    uint8_t *without;       /* [n_wraps]: 1: that one is left out */
-    int32_t *blocker;       /* [n_wraps]: whose string ends inside the obstacle; -1: none */
-    int32_t lost;           /* the last wrap that held no string in a row; -1: none */
-    int32_t pushes, pushed; /* see wrap_try(): whether it may, whether it did */
-    course_joint *joints;   /* [n_wraps] */
-    course_piece *pieces;   /* [n_points + 2 n_wraps] */
+    uint8_t *without;         /* [n_wraps]: 1: that one is left out */
+    uint8_t *out;             /* [n_wraps]: 1: of all courses; see release.c */
+    uint8_t *whole;           /* [n_wraps]: 1: it does not let go of a point; see release.c */
+    int32_t deepest;          /* 1: single strings let go of points, as where there is one */
+    int32_t *blocker;         /* [n_wraps]: whose string ends inside the obstacle; -1: none */
+    int32_t lost;             /* the last wrap that held no string in a row; -1: none */
+    int32_t pushes, pushed;   /* see wrap_try(): whether it may, whether it did */
+    course_joint *joints;     /* [n_wraps] */
+    course_joint *row_joints; /* [2 n_wraps]: kept while rows are tightened, as the next two */
+    wrap_string *row_strings;
+    int32_t *row_states;
+    course_piece *pieces; /* [n_points + 2 n_wraps] */
     int32_t n_joints, n_pieces;
     double *newton; /* [(2 n_wraps) x (2 n_wraps + 1)] */
     strand_step *steps[2];
     double *gradient, *hessian; /* of a route, with the joints' freedoms */
-    double *kept;               /* [4 x (n_own + n_own^2)]: of courses; see rivals.c */
+    double *kept;               /* [12 x (n_own + n_own^2)]: of courses; see mix.h */
     double *polynomial;         /* scratch */
     const double **factors;     /* [n_factors] */
     shared_factors *shared;     /* [n_numbers] */
@@ -189,6 +195,10 @@ void joint_begin(const route_work *work, int32_t stop, course_joint *joint);
 /* Distance of a point of ground from the obstacle of wrap w, as wrap_outside(). */
 double string_off(const path_route *route, int32_t w, const route_work *work, const double *at);
 
+/* That with gradient [3] and second derivatives [9] by the point, in ground. */
+double string_off_derivatives(const path_route *route, int32_t w, const route_work *work,
+                              const double *at, double *g, double *h);
+
 /* Moves a point of ground that is inside the obstacle of wrap w to beside it; 1: it did. */
 int string_clears(const path_route *route, int32_t w, const route_work *work, double *at);
 
@@ -199,6 +209,12 @@ int32_t joints_tighten(const path_route *route, route_work *work);
  * own coordinates. */
 double strand_length(const tree *tree, const path_route *route, const path_pose *pose,
                      route_work *work, int32_t *stride, double *gradient, double *hessian);
+
+/* How far a point is outside the obstacle of wrap w, as wrap_outside(), with gradient [n_own] and
+ * second derivatives (NULL: not wanted) by the own coordinates. */
+double strand_outside(const tree *tree, const path_route *route, const path_pose *pose,
+                      route_work *work, int32_t w, int32_t point, double *gradient,
+                      double *hessian);
 
 /* Whether a coordinate is out of centre +- scale. */
 int polynomial_is_left(const path_route *route, const double *numbers);

@@ -219,3 +219,23 @@ double strand_length(const tree *t, const path_route *route, const path_pose *po
     }
     return length;
 }
+
+double strand_outside(const tree *t, const path_route *route, const path_pose *pose,
+                      route_work *work, int32_t w, int32_t point, double *gradient,
+                      double *hessian) {
+    const double *at = work->places + 3 * point;
+    double g[3], h[9], off = string_off_derivatives(route, w, work, at, g, h);
+    int32_t n_own = route->n_own, n;
+    if (gradient == NULL) {
+        return off;
+    }
+    memset(gradient, 0, sizeof *gradient * (size_t)n_own);
+    if (hessian != NULL) {
+        memset(hessian, 0, sizeof *hessian * (size_t)(n_own * n_own));
+    }
+    n = way_steps(t, route, pose, route->wraps[w].link, route->points[point].place->link, at,
+                  work->steps[0]);
+    n += moving_steps(route, pose, work, point, work->steps[0] + n);
+    end_add(work->steps[0], n, g, h, n_own, gradient, hessian);
+    return off;
+}

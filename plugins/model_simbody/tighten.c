@@ -11,6 +11,7 @@
 #define MAX_NEWTON 40
 #define MAX_HALVINGS 12
 #define MAX_CLEAR 20
+#define MAX_AGAIN 3
 #define OFF_CENTRE 0.2
 #define FINE 1e-6    /* m: steps that lengths cannot judge */
 #define TIGHT 1e-8   /* m: last step of Newton's method */
@@ -113,6 +114,7 @@ static double joints_length(const path_route *route, route_work *work, int32_t *
         }
         piece_ends(work, piece, ends);
         wrap_string last = work->strings[w];
+        last.keeps = 1;
         work->state[w] = string_between(route, w, ends[0], ends[1],
                                         work->state[w] > 0 ? &last : NULL, work, &work->strings[w]);
         if (work->state[w] < 0) {
@@ -150,10 +152,31 @@ static void joints_move(route_work *work, double share) {
     }
 }
 
+/* The joint behind piece i, if it is inside one of its obstacles, is put beside it. */
+static void joint_clear(const path_route *route, route_work *work, int32_t i) {
+    const course_piece *before = &work->pieces[i], *after = before + 1;
+    double *at = work->joints[before->joint[1]].at;
+    for (int k = 0; k < MAX_CLEAR; k++) {
+        int moved = string_clears(route, before->wrap, work, at);
+        moved |= string_clears(route, after->wrap, work, at);
+        if (!moved) {
+            break;
+        }
+    }
+}
+
+static void joints_clear(const path_route *route, route_work *work) {
+    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
+        if (work->pieces[i].joint[1] >= 0) {
+            joint_clear(route, work, i);
+        }
+    }
+}
+
 /* Joints that are near the end of the straight way between their strings, beyond which they could
  * not follow, are put into its middle. Returns the length then. */
 static double joints_centre(const path_route *route, route_work *work, double length,
-                            int32_t *lost) {
+                            int32_t *again, int32_t *lost) {
     for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
         int32_t j = work->pieces[i].joint[1], u = work->pieces[i].wrap;
         int32_t w = work->pieces[i + 1].wrap;
@@ -169,6 +192,12 @@ static double joints_centre(const path_route *route, route_work *work, double le
         course_joint last = work->joints[j];
         joint_put(&work->joints[j], before->b, after->a, before->t[1]);
         double now = joints_length(route, work, lost);
+        if (now > length * (1 + 1e-12) && *again > 0) {
+            joint_clear(route, work, i);
+            now = joints_length(route, work, lost);
+            *again -= 1;
+            length = isfinite(now) ? now : length;
+        }
         if (now <= length * (1 + 1e-12)) {
             length = now;
         } else {
@@ -179,47 +208,49 @@ static double joints_centre(const path_route *route, route_work *work, double le
     return length;
 }
 
-/* A joint that is inside one of its obstacles is put beside it. */
-static void joints_clear(const path_route *route, route_work *work) {
-    for (int32_t i = 0; i + 1 < work->n_pieces; i++) {
-        const course_piece *before = &work->pieces[i], *after = before + 1;
-        if (before->joint[1] < 0 || before->joint[1] != after->joint[0]) {
-            continue;
-        }
-        double *at = work->joints[before->joint[1]].at;
-        for (int k = 0; k < MAX_CLEAR; k++) {
-            int moved = string_clears(route, before->wrap, work, at);
-            moved |= string_clears(route, after->wrap, work, at);
-            if (!moved) {
-                break;
-            }
-        }
-    }
+/* The row as it is, into place k. */
+static void row_keep(const path_route *route, route_work *work, int32_t k) {
+    size_t n = (size_t)route->n_wraps, at = (size_t)k * n;
+    memcpy(work->row_joints + at, work->joints, sizeof *work->joints * n);
+    memcpy(work->row_strings + at, work->strings, sizeof *work->strings * n);
+    memcpy(work->row_states + at, work->state, sizeof *work->state * n);
 }
 
-int32_t joints_tighten(const path_route *route, route_work *work) {
+static void row_restore(const path_route *route, route_work *work, int32_t k) {
+    size_t n = (size_t)route->n_wraps, at = (size_t)k * n;
+    memcpy(work->joints, work->row_joints + at, sizeof *work->joints * n);
+    memcpy(work->strings, work->row_strings + at, sizeof *work->strings * n);
+    memcpy(work->state, work->row_states + at, sizeof *work->state * n);
+}
+
+#define TIGHTENED 1
+#define STUCK 0
+#define LOST (-1) /* a string: *lost */
+
+/* Newton's method, from where the joints are. */
+static int row_pull(const path_route *route, route_work *work, int32_t again, int32_t *lost) {
     static const double shifts[] = {0, 30, 300, 3e3, 3e4}; /* 1/m */
-    int32_t lost = -1, n = 2 * work->n_joints;
-    joints_clear(route, work);
-    double length = joints_length(route, work, &lost);
-    for (int32_t k = 0; k < MAX_NEWTON && isfinite(length); k++) {
-        length = joints_centre(route, work, length, &lost);
+    int32_t n = 2 * work->n_joints;
+    double length = joints_length(route, work, lost), step = INFINITY;
+    for (int32_t k = 0; k < MAX_NEWTON && isfinite(length) && step >= TIGHT; k++) {
+        length = joints_centre(route, work, length, &again, lost);
         size_t s = 0;
         while (s < sizeof shifts / sizeof shifts[0] && joints_step(route, work, shifts[s]) != 0) {
             s++;
         }
-        double step = 0, now = INFINITY;
+        double now = INFINITY;
+        step = 0;
         for (int32_t j = 0; j < n; j++) {
             step = fmax(step, fabs(work->newton[j * (n + 1) + n]));
         }
         if (isnan(step)) {
-            break;
+            return STUCK;
         }
         double share = step > LONGEST ? LONGEST / step : 1;
         double least = length * (1 + (step < FINE ? 1e-12 : 0)); /* rounding of lengths */
         joints_move(work, share);
         for (int half = 0; half < MAX_HALVINGS; half++) {
-            now = joints_length(route, work, &lost);
+            now = joints_length(route, work, lost);
             if (now <= least) {
                 break;
             }
@@ -228,13 +259,28 @@ int32_t joints_tighten(const path_route *route, route_work *work) {
         }
         if (!(now <= least)) { /* no way down: at the end of the digits, or in a cleft */
             joints_move(work, -share);
-            (void)joints_length(route, work, &lost);
-            break;
+            (void)joints_length(route, work, lost);
+            return step < FINE ? TIGHTENED : STUCK;
         }
         length = now;
-        if (step < TIGHT) { /* the next one would be its square */
-            break;
-        }
     }
-    return isfinite(length) ? -1 : lost;
+    return !isfinite(length) ? LOST : step < FINE ? TIGHTENED : STUCK;
+}
+
+int32_t joints_tighten(const path_route *route, route_work *work) {
+    int32_t lost = -1, none = -1;
+    joints_clear(route, work);
+    row_keep(route, work, 0);
+    int done = row_pull(route, work, 0, &lost);
+    if (done != STUCK) {
+        return done == LOST ? lost : -1;
+    }
+    /* a joint may have gone past the place where the path comes onto an obstacle, which it does not
+     * see from there: once more, with joints put back between their obstacles */
+    row_keep(route, work, 1);
+    row_restore(route, work, 0);
+    if (row_pull(route, work, MAX_AGAIN, &none) != TIGHTENED) {
+        row_restore(route, work, 1);
+    }
+    return -1;
 }

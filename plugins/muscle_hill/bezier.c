@@ -75,11 +75,27 @@ static void hill_corner_make(const struct hill_joint *a, const struct hill_joint
     hill_power(a->x, a->x + c * (x - a->x), b->x + c * (x - b->x), b->x, out->x);
     hill_power(a->y, a->y + c * (y - a->y), b->y + c * (y - b->y), b->y, out->y);
     out->u[0] = 0;
+    out->cells = HILL_CELLS / (b->x - a->x);
     for (int k = 1; k <= HILL_CELLS; k++) {
         double t = (double)k / HILL_CELLS;
         out->u[k] =
             k < HILL_CELLS ? hill_series_root(out->x, a->x + t * (b->x - a->x), out->u[k - 1]) : 1;
     }
+    for (int k = 0; k <= HILL_CELLS; k++) {
+        double at[3];
+        hill_series(out->x, out->u[k], at);
+        out->slope[k] = 1 / (at[1] * out->cells);
+    }
+}
+
+/* u at x, nearly: a cubic between the ends of its cell. */
+static double hill_corner_guess(const struct hill_corner *corner, double x) {
+    double cell = (x - corner->x0) * corner->cells;
+    int k = cell < HILL_CELLS ? (int)cell : HILL_CELLS - 1;
+    double t = cell - k, rest = 1 - t, u0 = corner->u[k], u1 = corner->u[k + 1];
+    return u0 + t * (u1 - u0) +
+           t * rest *
+               (rest * (corner->slope[k] - (u1 - u0)) - t * (corner->slope[k + 1] - (u1 - u0)));
 }
 
 void hill_chain_make(const struct hill_joint *joints, const double *curviness, int32_t n,
@@ -119,10 +135,7 @@ struct hill_chain_value hill_chain_at(const struct hill_chain *chain, double x) 
         i++;
     }
     const struct hill_corner *corner = &chain->corner[i];
-    double cell = (x - corner->x0) / (corner->x1 - corner->x0) * HILL_CELLS;
-    int k = cell < HILL_CELLS ? (int)cell : HILL_CELLS - 1;
-    double u = corner->u[k] + (cell - k) * (corner->u[k + 1] - corner->u[k]);
-    return hill_corner_at(corner, hill_series_root(corner->x, x, u));
+    return hill_corner_at(corner, hill_series_root(corner->x, x, hill_corner_guess(corner, x)));
 }
 
 struct hill_chain_value hill_chain_solve(const struct hill_chain *chain, double gain, double weight,

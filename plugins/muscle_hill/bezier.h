@@ -14,11 +14,12 @@ struct hill_joint {
     double x, y, slope;
 };
 
-/* A segment: x(u), y(u) for u in 0..1 as power series, and u at equal parts of x to start from. */
+/* A segment: x(u), y(u) for u in 0..1 as power series, and to start from u and its slope by cells
+ * at equal parts of x. */
 struct hill_corner {
-    double x0, x1, y1;
+    double x0, x1, y1, cells; /* the last: of each unit of x */
     double x[6], y[6];
-    double u[HILL_CELLS + 1];
+    double u[HILL_CELLS + 1], slope[HILL_CELLS + 1];
 };
 
 struct hill_chain {

@@ -185,17 +185,32 @@ static mhe_status hill_make_elastic(const mhe_muscle *from, const struct hill_co
     return MHE_OK;
 }
 
-static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *from,
+/* Curves of muscle i: those of an earlier one that states the same, as most models' muscles do. One
+ * table for all stays in the cache. */
+static mhe_status hill_take_millard(struct hill *hill, int32_t i, const mhe_muscle *muscles,
+                                    mhe_error *err) {
+    const mhe_muscle *from = &muscles[i];
+    for (int32_t j = 0; j < i; j++) {
+        if (hill->m[j].millard != NULL &&
+            memcmp(&muscles[j].millard, &from->millard, sizeof from->millard) == 0) {
+            hill->m[i].millard = hill->m[j].millard;
+            return MHE_OK;
+        }
+    }
+    hill->m[i].millard = &hill->millard[i];
+    return hill_millard_make(&from->millard, from->name, from->line, &hill->millard[i], err);
+}
+
+static mhe_status hill_fill(struct hill *hill, int32_t i, const mhe_muscle *muscles,
                             const struct hill_config *config, mhe_error *err) {
+    const mhe_muscle *from = &muscles[i];
     const struct hill_curve_set *set = hill_set_of(from, config);
     struct hill_muscle *m = &hill->m[i];
     m->f_max = from->max_isometric_force;
     m->l_slack = from->tendon_slack_length;
     m->inverse = 1 / from->optimal_fiber_length;
     if (set->millard) {
-        m->millard = &hill->millard[i];
-        mhe_status status =
-            hill_millard_make(&from->millard, from->name, from->line, &hill->millard[i], err);
+        const mhe_status status = hill_take_millard(hill, i, muscles, err);
         if (status != MHE_OK) {
             return status;
         }
@@ -275,7 +290,7 @@ mhe_status hill_create(const mhe_host *host, const mhe_muscle *muscles, int32_t 
         status = mhe_fail(err, MHE_E_MEMORY, "no memory for %d muscles", n_muscles);
     }
     for (int32_t i = 0; i < n_muscles && status == MHE_OK; i++) {
-        status = hill_fill(hill, i, &muscles[i], config, err);
+        status = hill_fill(hill, i, muscles, config, err);
     }
     if (status == MHE_OK && hill_make_columns(hill) != MHE_OK) {
         status = mhe_fail(err, MHE_E_MEMORY, "no memory for %d muscles", n_muscles);

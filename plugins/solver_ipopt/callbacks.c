@@ -5,6 +5,8 @@
 
 #include <math.h>
 
+#define NO_BOUND 2e19 /* beyond nlp_upper_bound_inf */
+
 /* What an iteration is beside a solution by recursions (mhe_solve_control.spent): a sparse
  * factorisation and its solutions. */
 #define SOLUTIONS 40
@@ -135,14 +137,20 @@ static compat_bool intermediate(compat_index mode, compat_index iteration, compa
     return s->stopped == 0 && s->nlp.failure == MHE_OK;
 }
 
-IpoptProblem ipopt_problem(const nlp *p, double *lower, double *upper, double *zero) {
+/* What is constant in g is no equation for Ipopt, which wants as many variables as it has. */
+IpoptProblem ipopt_problem(const nlp *p, double *lower, double *upper, double *g_lower,
+                           double *g_upper) {
+    for (int32_t i = 0; i < p->m; i++) {
+        g_upper[i] = p->n_constant > 0 && p->constant[i] ? NO_BOUND : 0;
+        g_lower[i] = -g_upper[i];
+    }
     for (int32_t i = 0; i < p->n; i++) {
         lower[i] = p->lower[p->of[i]];
         upper[i] = p->upper[p->of[i]];
     }
     IpoptProblem ipopt =
-        CreateIpoptProblem(p->n, lower, upper, p->m, zero, zero, p->n_jacobian, p->n_hessian, 0,
-                           eval_f, eval_g, eval_grad_f, eval_jac_g, eval_h);
+        CreateIpoptProblem(p->n, lower, upper, p->m, g_lower, g_upper, p->n_jacobian, p->n_hessian,
+                           0, eval_f, eval_g, eval_grad_f, eval_jac_g, eval_h);
     if (ipopt != NULL) {
         SetIntermediateCallback(ipopt, intermediate);
     }

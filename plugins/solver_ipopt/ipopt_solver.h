@@ -49,11 +49,13 @@ typedef struct ipopt_solver {
     int32_t iterations;
     double begun;        /* s of CLOCK_MONOTONIC, of the first iteration */
     double kkt_residual; /* scaled primal and dual infeasibility of the last iterate */
+    double constant_gap; /* largest of the equations in which nothing is free, at the result */
 } ipopt_solver;
 
 /* callbacks.c: an Ipopt problem for the current bounds of p, or NULL; user data is the
- * ipopt_solver. `lower`, `upper` [n] are overwritten, zero [m] holds zeros. */
-IpoptProblem ipopt_problem(const nlp *p, double *lower, double *upper, double *zero);
+ * ipopt_solver. All arrays are overwritten: those of variables [n], of g [m]. */
+IpoptProblem ipopt_problem(const nlp *p, double *lower, double *upper, double *g_lower,
+                           double *g_upper);
 
 /* curvature.c: forgets the last solve. */
 void curvature_begin(ipopt_curvature *c, int32_t n);

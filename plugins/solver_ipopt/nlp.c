@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "nlp.h"
 
+#include "../constant_rows.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -72,6 +74,7 @@ mhe_status nlp_create(nlp *p, const mhe_stage_problem *problem, mhe_error *err) 
     p->stride = node_layout(problem).end;
     p->of = malloc(n_all * sizeof *p->of);
     p->number = malloc(n_all * sizeof *p->number);
+    p->constant = calloc((size_t)p->m + 1, 1);
     p->w = calloc(n_all, sizeof *p->w);
     p->lower = malloc(n_all * sizeof *p->lower);
     p->upper = malloc(n_all * sizeof *p->upper);
@@ -83,8 +86,9 @@ mhe_status nlp_create(nlp *p, const mhe_stage_problem *problem, mhe_error *err) 
     if (p->full != NULL) {
         memset(p->full, 1, n_full);
     }
-    if (p->full == NULL || p->of == NULL || p->number == NULL || p->w == NULL || p->lower == NULL ||
-        p->upper == NULL || p->store == NULL || p->jacobian == NULL || p->hessian == NULL) {
+    if (p->full == NULL || p->constant == NULL || p->of == NULL || p->number == NULL ||
+        p->w == NULL || p->lower == NULL || p->upper == NULL || p->store == NULL ||
+        p->jacobian == NULL || p->hessian == NULL) {
         nlp_free(p);
         return mhe_fail(err, MHE_E_MEMORY, "no memory for a program of %d variables",
                         (int)(N * (n_x + n_u) + n_x + n_p));
@@ -95,6 +99,7 @@ mhe_status nlp_create(nlp *p, const mhe_stage_problem *problem, mhe_error *err) 
 void nlp_free(nlp *p) {
     free(p->of);
     free(p->number);
+    free(p->constant);
     free(p->w);
     free(p->lower);
     free(p->upper);
@@ -207,6 +212,7 @@ int32_t nlp_read_bounds(nlp *p) {
     }
     p->n = n;
     if (renumber) {
+        p->n_constant = n < p->m ? constant_rows(problem, p->constant) : 0;
         number_matrices(p);
     }
     return renumber || changed ? NLP_CHANGED : NLP_SAME;
@@ -331,6 +337,14 @@ void nlp_constraints(const nlp *p, double *g) {
             g[k * n_x + i] = next[i] - reached[i];
         }
     }
+}
+
+double nlp_constant_gap(const nlp *p, const double *g) {
+    double largest = 0;
+    for (int32_t i = 0; i < p->m && p->n_constant > 0; i++) {
+        largest = p->constant[i] ? fmax(largest, fabs(g[i])) : largest;
+    }
+    return largest;
 }
 
 void nlp_cost_gradient(const nlp *p, double *grad) {

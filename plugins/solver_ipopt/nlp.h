@@ -24,6 +24,8 @@ typedef struct nlp {
     int32_t n_all, n, m;           /* variables, free ones, constraints */
     int32_t *of;                   /* [n] position in w of a free variable */
     int32_t *number;               /* [n_all] number of a free variable; -1: fixed */
+    uint8_t *constant;             /* [m] equations in which nothing is free */
+    int32_t n_constant;            /* so many, where there are fewer variables than equations; 0 */
     uint8_t *full;                 /* pattern of the blocks of parameters, which have no zeros */
     double *w;                     /* [n_all] the point evaluated last */
     double *lower, *upper;         /* [n_all] */
@@ -66,8 +68,9 @@ int32_t nlp_evaluate(nlp *p, const double *v, int32_t level);
 
 /* Read what nlp_evaluate made known. */
 double nlp_cost(const nlp *p);
-void nlp_constraints(const nlp *p, double *g);      /* [m] */
-void nlp_cost_gradient(const nlp *p, double *grad); /* [n_all], fixed variables too */
+void nlp_constraints(const nlp *p, double *g);          /* [m] */
+double nlp_constant_gap(const nlp *p, const double *g); /* largest of what is constant in it */
+void nlp_cost_gradient(const nlp *p, double *grad);     /* [n_all], fixed variables too */
 /* Slope of the Lagrangian without bounds in every variable [n_all], for lambda [m]. */
 void nlp_lagrangian_gradient(const nlp *p, const double *lambda, double *grad);
 /* One over the geometric mean of the positive curvatures of the controls (of the states where there

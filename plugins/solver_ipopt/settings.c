@@ -118,7 +118,7 @@ mhe_status ipopt_check(const struct ipopt_config *config, mhe_error *err) {
     double lower = 0, upper = 1, zero = 0;
     mhe_stage_problem none = {.n_x = 1, .xx_pattern = &one};
     nlp smallest = {.problem = &none, .n = 1, .of = &of, .lower = &lower, .upper = &upper};
-    IpoptProblem ipopt = ipopt_problem(&smallest, &lower, &upper, &zero);
+    IpoptProblem ipopt = ipopt_problem(&smallest, &lower, &upper, &zero, &zero);
     if (ipopt == NULL) {
         return mhe_fail(err, MHE_E_INTERNAL, "Ipopt %s refuses a problem of one variable",
                         IPOPT_VERSION);

@@ -132,10 +132,10 @@ static mhe_status prepare(ipopt_solver *s, int32_t changed, mhe_error *err) {
     if (s->ipopt != NULL) {
         FreeIpoptProblem(s->ipopt);
     }
-    double *lower = calloc(3 * (size_t)p->n_all, sizeof(double));
-    s->ipopt = lower != NULL
-                   ? ipopt_problem(p, lower, lower + p->n_all, lower + 2 * (ptrdiff_t)p->n_all)
-                   : NULL;
+    const ptrdiff_t n = p->n_all;
+    double *lower = calloc(4 * (size_t)n, sizeof(double));
+    s->ipopt =
+        lower != NULL ? ipopt_problem(p, lower, lower + n, lower + 2 * n, lower + 3 * n) : NULL;
     free(lower);
     if (s->ipopt == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "no memory for an Ipopt problem");
@@ -219,9 +219,19 @@ static void write_result(ipopt_solver *s, mhe_solution *out, mhe_solve_info *inf
         write_multipliers(s, out);
         nlp_constraints(p, s->work);
         info->primal_residual = largest(s->work, p->m);
+        s->constant_gap = nlp_constant_gap(p, s->work);
         info->objective = nlp_cost(p);
         info->kkt_residual = fmax(s->kkt_residual, s->scale * complementarity(s));
     }
+}
+
+/* Nothing is free: the dynamics hold or they do not. */
+static void judge_constant(ipopt_solver *s, mhe_solution *solution, mhe_solve_info *info) {
+    memset(s->lambda, 0, sizeof(double) * (size_t)s->nlp.m);
+    s->kkt_residual = 0;
+    write_result(s, solution, info);
+    info->outcome =
+        info->primal_residual <= s->config->tolerance ? MHE_SOLVE_CONVERGED : MHE_SOLVE_INFEASIBLE;
 }
 
 static mhe_status ipopt_solve(void *self, const mhe_solve_control *control, mhe_solution *solution,
@@ -239,13 +249,17 @@ static mhe_status ipopt_solve(void *self, const mhe_solve_control *control, mhe_
         info->outcome = MHE_SOLVE_INFEASIBLE;
         return MHE_OK;
     }
-    if (p->n < p->m) {
+    if (p->n < p->m - p->n_constant) {
         return mhe_fail(err, MHE_E_ARGUMENT, "%d free variables cannot satisfy %d constraints",
                         (int)p->n, (int)p->m);
     }
     int32_t warm = read_start(s, solution);
     if (!is_finite(p->w, p->n_all)) {
         return mhe_fail(err, MHE_E_ARGUMENT, "the start of the solve is not finite");
+    }
+    if (p->n == 0) {
+        judge_constant(s, solution, info);
+        return p->failure != MHE_OK ? mhe_fail(err, p->failure, "%s", p->error.text) : MHE_OK;
     }
     mhe_status status = prepare(s, change == NLP_CHANGED, err);
     if (status != MHE_OK) {
@@ -255,6 +269,7 @@ static mhe_status ipopt_solve(void *self, const mhe_solve_control *control, mhe_
     s->control = control;
     s->stopped = s->iterations = 0;
     s->kkt_residual = INFINITY;
+    s->constant_gap = 0;
     curvature_begin(&s->curvature, p->n);
     p->all_next = 1;
     int32_t verdict =
@@ -265,7 +280,9 @@ static mhe_status ipopt_solve(void *self, const mhe_solve_control *control, mhe_
     write_result(s, solution, info);
     info->iterations = s->iterations;
     info->evaluation_time = p->seconds;
-    info->outcome = outcome(s, verdict, info->primal_residual);
+    info->outcome = s->constant_gap > s->config->tolerance
+                        ? MHE_SOLVE_INFEASIBLE
+                        : outcome(s, verdict, info->primal_residual);
     if (info->outcome < 0) {
         info->outcome = MHE_SOLVE_FAILED;
         return mhe_fail(err, MHE_E_NUMERIC, "Ipopt %s gave up with code %d (linear solver '%s')",

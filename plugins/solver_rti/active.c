@@ -92,7 +92,7 @@ static int32_t solve_set(qp *q, double regularisation) {
     const qp_shape *s = q->shape;
     set_constants(q);
     memset(q->lambda, 0, sizeof(double) * size_x(s));
-    qp_slope(s, q->stages, q->w, q->lambda, q->slope);
+    qp_slope(s, q->stages, q->w, s->n_p > 0 ? q->lambda : NULL, q->slope);
     qp_gaps(s, q->stages, q->w, q->gap);
     for (int32_t k = 0; k <= s->N; k++) {
         for (int32_t i = 0; i < s->n_z; i++) {

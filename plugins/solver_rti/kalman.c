@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "kalman.h"
 
+#include <math.h>
 #include <string.h>
 
 int32_t kalman_takes(const qp_shape *s) {
@@ -21,10 +22,10 @@ static void pieces(const qp_shape *s, kalman *f, piece *out) {
     const size_t n_z = (size_t)s->n_z, n_u = (size_t)s->n_u;
     const size_t ld_d = (size_t)KERNEL_LD(s->n_dense), ld_x = (size_t)s->ld_x;
     const size_t ld_w = (size_t)KERNEL_LD(s->n_dense + s->n_x), ld_z = (size_t)s->ld_z;
-    const size_t x = size_x(s), z = size_z(s);
+    const size_t x = size_x(s), z = size_z(s), simple = s->n_dense < s->n_x ? n_x : 0;
     const piece all[N_PIECES] = {{&f->FT, N * n_z * ld_d},
                                  {&f->h, z},
-                                 {&f->C, N * n_x * ld_d},
+                                 {&f->C, N * simple * ld_d},
                                  {&f->U, (N + 1) * n * ld_d},
                                  {&f->U_inverse, (N + 1) * ld_d},
                                  {&f->W, (N + 1) * n * ld_w},
@@ -36,7 +37,7 @@ static void pieces(const qp_shape *s, kalman *f, piece *out) {
                                  {&f->closed, x},
                                  {&f->inverse, z},
                                  {&f->before, n_x * ld_x},
-                                 {&f->after, n_x * ld_x},
+                                 {&f->after, simple * ld_x},
                                  {&f->T, n_x * ld_d},
                                  {&f->L, n * ld_d},
                                  {&f->noise, n_u * ld_d},
@@ -136,13 +137,15 @@ static int32_t complete_squares(kalman *f, const qp_stage *stage, const double *
     return positive;
 }
 
-/* Rows of F^T for the closed loop, and those of u times their covariances. */
+/* Rows of F^T for the closed loop. */
 static void close_loop(kalman *f, int32_t k) {
     const qp_shape *s = f->shape;
     const double *FT = kalman_FT_of(f, k), *K = kalman_simple_x(f, f->K, k);
-    const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z;
     const ptrdiff_t u = kalman_first_control(f);
     double *C = kalman_C_of(f, k);
+    if (f->m == 0) {
+        return;
+    }
     memcpy(C, FT + s->n_u * f->ld_d, sizeof(double) * (size_t)(s->n_x * f->ld_d));
     for (int32_t j = 0; j < f->m; j++) {
         double *to = C + (f->n + j) * f->ld_d;
@@ -151,13 +154,27 @@ static void close_loop(kalman *f, int32_t k) {
             to[i] -= by * from[i];
         }
     }
+}
+
+/* What the controls bring, on and above the diagonal of `next`: half of each covariance on either
+ * side, and nothing of those that are held. */
+static void add_noise(kalman *f, int32_t k, double *next) {
+    const qp_shape *s = f->shape;
+    const double *FT = kalman_FT_of(f, k), *inverse = f->inverse + (ptrdiff_t)k * s->ld_z;
+    int32_t n = 0;
     for (int32_t j = 0; j < s->n_u; j++) {
-        double *to = f->noise + j * f->ld_d;
-        const double *from = FT + j * f->ld_d, by = inverse[j];
+        if (inverse[j] == 0) {
+            continue;
+        }
+        double *to = f->noise + n * f->ld_d;
+        const double *from = FT + j * f->ld_d, by = sqrt(inverse[j]);
         for (int32_t i = 0; i < f->ld_d; i++) {
             to[i] = by * from[i];
         }
+        n++;
     }
+    s->kernels->product(f->n, f->n, n, 1, f->noise, f->ld_d, f->noise, f->ld_d, NULL, next, s->ld_x,
+                        1);
 }
 
 /* Sigma' of a first node that is a variable; 0: its cost is not positive definite. */
@@ -179,15 +196,18 @@ static int32_t begin_free(kalman *f, const qp_stage *stage, const double *diagon
     if (!s->kernels->factor(n, 2 * n, W, ld_w, kalman_of_d(f, f->W_inverse, 0))) {
         return 0;
     }
-    memset(f->after, 0, sizeof(double) * (size_t)(s->n_x * s->ld_x));
-    s->kernels->product(n, n, n, 1, W + n, ld_w, W + n, ld_w, NULL, f->after, s->ld_x, 1);
-    s->kernels->mirror(n, f->after, s->ld_x);
-    memcpy(kalman_D_of(f, 0), f->after, sizeof(double) * (size_t)(n * s->ld_x));
+    double *after = kalman_after(f, 0);
+    memset(after, 0, sizeof(double) * (size_t)(s->n_x * s->ld_x));
+    s->kernels->product(n, n, n, 1, W + n, ld_w, W + n, ld_w, NULL, after, s->ld_x, 1);
+    s->kernels->mirror(n, after, s->ld_x);
     for (int32_t j = 0; j < f->m; j++) {
         if (!held[n + j] && !(p[j] > 0)) {
             return 0;
         }
-        f->after[(n + j) * (s->ld_x + 1)] = held[n + j] ? 0 : 1 / p[j];
+        after[(n + j) * (s->ld_x + 1)] = held[n + j] ? 0 : 1 / p[j];
+    }
+    if (f->m > 0) {
+        memcpy(kalman_D_of(f, 0), after, sizeof(double) * (size_t)(n * s->ld_x));
     }
     return 1;
 }
@@ -196,26 +216,25 @@ static int32_t begin_free(kalman *f, const qp_stage *stage, const double *diagon
 static void predict(kalman *f, const qp_stage *stage, int32_t k) {
     const qp_shape *s = f->shape;
     const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_d = f->ld_d;
-    const double *FT = kalman_FT_of(f, k), *C = kalman_C_of(f, k),
-                 *closed = kalman_simple_x(f, f->closed, k);
-    const double *beta = stage->by_control + n;
+    const double *C = kalman_C_of(f, k), *closed = kalman_simple_x(f, f->closed, k);
+    const double *beta = stage->by_control + n, *after = kalman_after(f, k);
     const double *inverse = f->inverse + (ptrdiff_t)k * s->ld_z + kalman_first_control(f);
-    const double *of_control = f->noise + kalman_first_control(f) * ld_d;
+    const double *of_control = kalman_FT_of(f, k) + kalman_first_control(f) * ld_d;
     const int32_t spread = k > 0 || f->free;
     double *next = f->before;
-    s->kernels->product(n, n, s->n_u, 1, FT, ld_d, f->noise, ld_d, NULL, next, ld_x, 1);
+    add_noise(f, k, next);
     if (spread) {
-        s->kernels->product(n_x, n, n_x, 1, f->after, ld_x, C, ld_d, NULL, f->T, ld_d, 0);
+        s->kernels->product(n_x, n, n_x, 1, after, ld_x, C, ld_d, NULL, f->T, ld_d, 0);
         s->kernels->product(n, n, n_x, 1, C, ld_d, f->T, ld_d, next, next, ld_x, 1);
     }
     for (int32_t j = 0; j < f->m; j++) {
         double *row = next + (n + j) * ld_x;
         const double *t = f->T + (n + j) * ld_d, *e = of_control + j * ld_d;
-        const double by_t = spread ? closed[j] : 0, by_e = beta[j];
+        const double by_t = spread ? closed[j] : 0, by_e = beta[j] * inverse[j];
         for (int32_t i = 0; i < n; i++) {
             row[i] = by_t * t[i] + by_e * e[i];
         }
-        const double *old = f->after + (n + j) * ld_x + n;
+        const double *old = after + (n + j) * ld_x + n;
         for (int32_t i = 0; i < f->m; i++) {
             row[n + i] = by_t * closed[i] * old[i];
         }
@@ -264,9 +283,6 @@ int32_t kalman_factor(kalman *f, const qp_stage *stages, const double *diagonal,
     }
     const int32_t first = first_changed(f, diagonal);
     f->known = 0;
-    if (first > 0 && first < s->N) {
-        memcpy(f->after, kalman_D_of(f, first), sizeof(double) * (size_t)(f->n * s->ld_x));
-    }
     if (f->free && !begin_free(f, &stages[0], diagonal)) {
         return 0;
     }

@@ -54,8 +54,9 @@ typedef struct kalman {
     int32_t ld_d, ld_w;
     double *FT;         /* [N][n_z x ld_d] dense rows of F, transposed */
     double *h;          /* [size_z] diagonals of H */
-    double *C;          /* [N][n_x x ld_d] the same of x, of the closed loop */
-    double *U;          /* [N+1][n x ld_d] Q = U^T U of the dense states */
+    double *C;          /* [N][n_x x ld_d] the same of x, of the closed loop; none: rows of FT */
+    double *U;          /* [N+1][n x ld_d] Q = U^T U of the dense states: a block of those that are
+                         * tied with zeros around it, and the diagonal of the others */
     double *U_inverse;  /* [N+1][ld_d] of its diagonal */
     double *W;          /* [N+1][n x ld_w] factor of S = I + U Sigma U^T, and its U^-T U Sigma */
     double *W_inverse;  /* [N+1][ld_d] */
@@ -64,7 +65,7 @@ typedef struct kalman {
     double *p;          /* [size_x + ld_x] curvatures of the costs to go of simple states */
     double *K, *closed; /* [size_x] */
     double *inverse;    /* [size_z] 1/R' */
-    double *before, *after; /* [n_x x ld_x] Sigma, Sigma' */
+    double *before, *after; /* [n_x x ld_x] Sigma, Sigma'; without simple states that is D */
     double *T, *L, *noise;  /* [n_x x ld_d], [n x ld_d], [n_u x ld_d] scratch */
     double *s, *v, *z, *x;  /* of a solution: [size_x + ld_x], [size_z], [N+1][ld_d], [N+1][ld_x] */
     double *pull, *eta, *lambda, *row, *next; /* [ld_z], [ld_x], [ld_d], [ld_w], [ld_x] scratch */
@@ -96,7 +97,8 @@ static inline double *kalman_FT_of(const kalman *f, int32_t k) {
     return f->FT + (ptrdiff_t)k * f->shape->n_z * f->ld_d;
 }
 static inline double *kalman_C_of(const kalman *f, int32_t k) {
-    return f->C + (ptrdiff_t)k * f->shape->n_x * f->ld_d;
+    return f->m > 0 ? f->C + (ptrdiff_t)k * f->shape->n_x * f->ld_d
+                    : kalman_FT_of(f, k) + f->shape->n_u * f->ld_d;
 }
 /* The simple states' part of a row of x. */
 static inline const double *kalman_simple_x(const kalman *f, const double *rows, int32_t k) {
@@ -116,6 +118,10 @@ static inline double *kalman_W_of(const kalman *f, int32_t k) {
 }
 static inline double *kalman_D_of(const kalman *f, int32_t k) {
     return f->D + (ptrdiff_t)k * f->n * f->shape->ld_x;
+}
+/* Sigma' while it is the last one. */
+static inline double *kalman_after(const kalman *f, int32_t k) {
+    return f->m > 0 ? f->after : kalman_D_of(f, k);
 }
 static inline double *kalman_of_d(const kalman *f, double *rows, int32_t k) {
     return rows + (ptrdiff_t)k * f->ld_d;

@@ -57,27 +57,42 @@ CLONES static void sweep_simple(kalman *f, const qp_stage *stages, kalman_units 
     }
 }
 
+/* Rows of a triangle that are solved together; what they see of the others is a product. */
+#define AT_ONCE 4
+
 /* y = U^-T y, [n x 8] */
-CLONES static void substitute(int32_t n, const double *U, int32_t ld, const double *inverse,
-                              double *y) {
-    for (int32_t i = 0; i < n; i++) {
-        const eight row = AT(lanes(y, i)) * inverse[i];
-        PUT(lanes(y, i)) = row;
-        for (int32_t j = i + 1; j < n; j++) {
-            PUT(lanes(y, j)) -= U[i * ld + j] * row;
+CLONES static void substitute(const kernels *by, int32_t n, const double *U, int32_t ld,
+                              const double *inverse, double *y) {
+    for (int32_t i = 0; i < n; i += AT_ONCE) {
+        const int32_t end = i + AT_ONCE < n ? i + AT_ONCE : n;
+        double *rows = lanes(y, i);
+        by->product(end - i, L, i, -1, U + i, ld, y, L, rows, rows, L, 0);
+        for (int32_t r = i; r < end; r++) {
+            eight row = AT(lanes(y, r));
+            for (int32_t j = i; j < r; j++) {
+                row -= U[j * ld + r] * AT(lanes(y, j));
+            }
+            PUT(lanes(y, r)) = inverse[r] * row;
         }
     }
 }
 
 /* y = -U^-1 y */
-CLONES static void substitute_back(int32_t n, const double *U, int32_t ld, const double *inverse,
-                                   double *y) {
-    for (int32_t i = n - 1; i >= 0; i--) {
-        eight sum = AT(lanes(y, i));
-        for (int32_t j = i + 1; j < n; j++) {
-            sum += U[i * ld + j] * AT(lanes(y, j));
+CLONES static void substitute_back(const kernels *by, int32_t n, const double *U, int32_t ld,
+                                   const double *inverse, double *y) {
+    for (int32_t end = n; end > 0;) {
+        const int32_t i = (end - 1) / AT_ONCE * AT_ONCE;
+        double *rows = lanes(y, i);
+        by->product_rows(end - i, L, n - end, 1, U + i * ld + end, ld, lanes(y, end), L, rows, rows,
+                         L);
+        for (int32_t r = end - 1; r >= i; r--) {
+            eight row = AT(lanes(y, r));
+            for (int32_t j = r + 1; j < end; j++) {
+                row += U[r * ld + j] * AT(lanes(y, j));
+            }
+            PUT(lanes(y, r)) = -inverse[r] * row;
         }
-        PUT(lanes(y, i)) = -inverse[i] * sum;
+        end = i;
     }
 }
 
@@ -85,7 +100,7 @@ CLONES static void substitute_back(int32_t n, const double *U, int32_t ld, const
 CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units *units,
                                  int32_t from, double *w) {
     const qp_shape *s = f->shape;
-    const int32_t n = f->n, ld_d = f->ld_d, u = kalman_first_control(f);
+    const int32_t n = f->n, n_b = s->n_tied, ld_d = f->ld_d, u = kalman_first_control(f);
     const size_t none = ROW * (size_t)(from + 1);
     memset(units->x, 0, none * (size_t)s->ld_x);
     memset(units->z, 0, none * (size_t)ld_d);
@@ -96,6 +111,7 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
         const double *v = block_of(w, k, s->ld_z, 0), *x = block_of(units->x, k, s->ld_x, 0);
         double *m = block_of(units->x, k + 1, s->ld_x, 0), *z = units->row;
         double *y = block_of(units->z, k + 1, ld_d, 0);
+        const double *U = kalman_U_of(f, k + 1), *U_inverse = kalman_of_d(f, f->U_inverse, k + 1);
         memcpy(m, block_of(units->b, k, s->ld_x, 0), ROW * (size_t)s->n_x);
         for (int32_t j = 0; j < f->m; j++) {
             const double by_state = k > from ? closed[j] : 0;
@@ -108,10 +124,17 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
         memcpy(m, z, ROW * (size_t)n);
         memcpy(y, block_of(units->g, k + 1, s->ld_z, s->n_u), ROW * (size_t)n);
         if (units->dense) {
-            substitute(n, kalman_U_of(f, k + 1), ld_d, kalman_of_d(f, f->U_inverse, k + 1), y);
+            substitute(s->kernels, n_b, U, ld_d, U_inverse, y);
+            for (int32_t i = n_b; i < n; i++) {
+                PUT(lanes(y, i)) = U_inverse[i] * AT(lanes(y, i));
+            }
         }
-        s->kernels->product_rows(n, L, n, 1, kalman_U_of(f, k + 1), ld_d, z, L, y, y, L);
-        substitute(n, kalman_W_of(f, k + 1), f->ld_w, kalman_of_d(f, f->W_inverse, k + 1), y);
+        s->kernels->product_rows(n_b, L, n_b, 1, U, ld_d, z, L, y, y, L);
+        for (int32_t i = n_b; i < n; i++) {
+            PUT(lanes(y, i)) += U[i * (ld_d + 1)] * AT(lanes(z, i));
+        }
+        substitute(s->kernels, n, kalman_W_of(f, k + 1), f->ld_w,
+                   kalman_of_d(f, f->W_inverse, k + 1), y);
         s->kernels->product(width, L, n, -1, kalman_W_of(f, k + 1) + n, f->ld_w, y, L, m, m, L, 0);
     }
 }
@@ -120,7 +143,7 @@ CLONES static void sweep_forward(kalman *f, const qp_stage *stages, kalman_units
 CLONES static void sweep_back(kalman *f, const qp_stage *stages, kalman_units *units, double *w,
                               double *lambda) {
     const qp_shape *s = f->shape;
-    const int32_t n = f->n, n_x = s->n_x, u = kalman_first_control(f);
+    const int32_t n = f->n, n_b = s->n_tied, n_x = s->n_x, u = kalman_first_control(f);
     double *eta = units->eta, *pull = units->pull;
     memset(eta, 0, ROW * (size_t)n_x);
     for (int32_t k = s->N; k > 0; k--) {
@@ -132,10 +155,14 @@ CLONES static void sweep_back(kalman *f, const qp_stage *stages, kalman_units *u
             s->kernels->product_rows(n, L, n_x, 1, kalman_D_of(f, k), s->ld_x, eta, L, x, x, L);
             s->kernels->product_rows(n, L, n_x, 1, W + n, f->ld_w, eta, L, y, y, L);
         }
-        substitute_back(n, W, f->ld_w, kalman_of_d(f, f->W_inverse, k), y);
+        substitute_back(s->kernels, n, W, f->ld_w, kalman_of_d(f, f->W_inverse, k), y);
         memcpy(lanes(out, n), lanes(eta, n), ROW * (size_t)f->m);
-        s->kernels->product(n, L, n, 1, U, f->ld_d, y, L, eta, out, L, 0);
-        s->kernels->product(s->n_u, L, n, 1, stages[k - 1].F, s->ld_z, out, L, NULL, pull, L, 0);
+        s->kernels->product(n_b, L, n_b, 1, U, f->ld_d, y, L, eta, out, L, 0);
+        for (int32_t i = n_b; i < n; i++) {
+            PUT(lanes(out, i)) = AT(lanes(eta, i)) + U[i * (f->ld_d + 1)] * AT(lanes(y, i));
+        }
+        s->kernels->product_rows(s->n_u, L, n, 1, kalman_FT_of(f, k - 1), f->ld_d, out, L, NULL,
+                                 pull, L);
         const double *beta = stages[k - 1].by_control + n;
         const double *closed = f->closed + (ptrdiff_t)(k - 1) * s->ld_x + n;
         const double *inverse = f->inverse + (ptrdiff_t)(k - 1) * s->ld_z;

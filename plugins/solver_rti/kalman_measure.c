@@ -5,21 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-/* Rows of the dense states' cost before a diagonal tail: a cost of velocities is one of each alone,
- * as a rule. */
-static int32_t rows_of_block(const kalman *f, const qp_stage *stage) {
-    const qp_shape *s = f->shape;
-    const double *H = stage->H + (ptrdiff_t)s->n_u * (s->ld_z + 1);
-    for (int32_t n = f->n; n > 0; n--) {
-        for (int32_t j = 0; j < n - 1; j++) {
-            if (H[j * s->ld_z + n - 1] != 0) {
-                return n;
-            }
-        }
-    }
-    return 0;
-}
-
 /* U of node k, and L = U^T, whose rows and columns behind the first n_b are a diagonal. */
 static int32_t factor_cost(kalman *f, const qp_stage *stage, const double *d, int32_t n_b,
                            int32_t k) {
@@ -30,10 +15,12 @@ static int32_t factor_cost(kalman *f, const qp_stage *stage, const double *d, in
     for (int32_t i = 0; i < n; i++) {
         const double *from = stage->H + (s->n_u + i) * s->ld_z + s->n_u;
         double *row = U + i * ld_d;
-        memset(row, 0, sizeof(double) * (size_t)n);
-        memcpy(row + i, from + i, sizeof(double) * (size_t)(i < n_b ? n_b - i : 1));
-        row[i] += d[i];
-        if (i >= n_b) {
+        if (i < n_b) {
+            memset(row, 0, sizeof(double) * (size_t)i);
+            memcpy(row + i, from + i, sizeof(double) * (size_t)(n_b - i));
+            row[i] += d[i];
+        } else {
+            row[i] = from[i] + d[i];
             positive &= row[i] > 0;
             inverse[i] = 1 / sqrt(row[i]);
             row[i] *= inverse[i];
@@ -46,7 +33,7 @@ static int32_t factor_cost(kalman *f, const qp_stage *stage, const double *d, in
         for (int32_t j = i / 4 * 4; j < i; j++) {
             U[i * ld_d + j] = 0;
         }
-        memset(U + i * ld_d + n_b, 0, sizeof(double) * (size_t)(n - n_b));
+        memset(U + i * ld_d + n_b, 0, sizeof(double) * (size_t)(KERNEL_LD(n_b) - n_b));
     }
     s->kernels->transpose(n_b, n_b, U, ld_d, f->L, ld_d);
     return 1;
@@ -88,8 +75,8 @@ static void weigh(kalman *f, int32_t n_b, int32_t width, int32_t k) {
 int32_t kalman_measure(kalman *f, const qp_stage *stage, const double *diagonal, int32_t k) {
     const qp_shape *s = f->shape;
     const int32_t n = f->n, n_x = s->n_x, ld_x = s->ld_x, ld_w = f->ld_w;
-    const int32_t last = k == s->N, width = last ? n : n_x, n_b = rows_of_block(f, stage);
-    double *W = kalman_W_of(f, k);
+    const int32_t last = k == s->N, width = last ? n : n_x, n_b = s->n_tied;
+    double *W = kalman_W_of(f, k), *after = kalman_after(f, k);
     if (!factor_cost(f, stage, diagonal + (ptrdiff_t)k * s->ld_z + s->n_u, n_b, k)) {
         return 0;
     }
@@ -98,10 +85,11 @@ int32_t kalman_measure(kalman *f, const qp_stage *stage, const double *diagonal,
         return 0;
     }
     if (!last) {
-        s->kernels->product(n_x, n_x, n, -1, W + n, ld_w, W + n, ld_w, f->before, f->after, ld_x,
-                            1);
-        s->kernels->mirror(n_x, f->after, ld_x);
-        memcpy(kalman_D_of(f, k), f->after, sizeof(double) * (size_t)(n * ld_x));
+        s->kernels->product(n_x, n_x, n, -1, W + n, ld_w, W + n, ld_w, f->before, after, ld_x, 1);
+        s->kernels->mirror(n_x, after, ld_x);
+        if (f->m > 0) {
+            memcpy(kalman_D_of(f, k), after, sizeof(double) * (size_t)(n * ld_x));
+        }
     }
     return 1;
 }

@@ -49,7 +49,7 @@ static void begin_mean(kalman *f, const double *g) {
 /* Means behind each measurement. */
 static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, const double *b) {
     const qp_shape *s = f->shape;
-    const int32_t n = f->n, ld_d = f->ld_d;
+    const int32_t n = f->n, n_b = s->n_tied, ld_d = f->ld_d;
     const ptrdiff_t u = kalman_first_control(f);
     if (f->free) {
         begin_mean(f, g);
@@ -58,6 +58,7 @@ static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, co
         const int32_t moves = k > 0 || f->free;
         const double *beta = stages[k].by_control + n, *closed = kalman_simple_x(f, f->closed, k);
         const double *v = f->v + (ptrdiff_t)k * s->ld_z, *x = f->x + (ptrdiff_t)k * s->ld_x;
+        const double *U = kalman_U_of(f, k + 1), *U_inverse = kalman_of_d(f, f->U_inverse, k + 1);
         double *y = f->row, *m = f->next, *z = kalman_of_d(f, f->z, k + 1);
         memcpy(m, b + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)s->ld_x);
         for (int32_t j = 0; j < f->m; j++) {
@@ -74,9 +75,11 @@ static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, co
         const int32_t width = k + 1 == s->N ? n : s->n_x;
         memset(y, 0, sizeof(double) * (size_t)f->ld_w);
         memcpy(y, g + (ptrdiff_t)(k + 1) * s->ld_z + s->n_u, sizeof(double) * (size_t)n);
-        s->kernels->substitute(n, n, kalman_U_of(f, k + 1), ld_d,
-                               kalman_of_d(f, f->U_inverse, k + 1), y);
-        s->kernels->add(n, n, 1, kalman_U_of(f, k + 1), ld_d, z, y);
+        s->kernels->substitute(n_b, n_b, U, ld_d, U_inverse, y);
+        s->kernels->add(n_b, n_b, 1, U, ld_d, z, y);
+        for (int32_t i = n_b; i < n; i++) {
+            y[i] = U_inverse[i] * y[i] + U[i * (ld_d + 1)] * z[i];
+        }
         memcpy(y + n, m, sizeof(double) * (size_t)width);
         memset(y + n + width, 0, sizeof(double) * (size_t)(f->ld_w - n - width));
         s->kernels->substitute(n, n + width, kalman_W_of(f, k + 1), f->ld_w,
@@ -90,11 +93,12 @@ static void sweep_forward(kalman *f, const qp_stage *stages, const double *g, co
 /* Pulls: dense states, multipliers of the closed loop, controls of the closed loop -> v. */
 static void sweep_back(kalman *f, const qp_stage *stages, double *w, double *lambda) {
     const qp_shape *s = f->shape;
-    const int32_t n = f->n, n_x = s->n_x, ld_d = f->ld_d;
+    const int32_t n = f->n, n_b = s->n_tied, n_x = s->n_x, ld_d = f->ld_d;
     const ptrdiff_t u = kalman_first_control(f);
     memset(f->eta, 0, sizeof(double) * (size_t)s->ld_x);
     for (int32_t k = s->N; k > 0; k--) {
         const int32_t last = k == s->N;
+        const double *U = kalman_U_of(f, k);
         double *x = row_z(s, w, k) + s->n_u, *y = kalman_of_d(f, f->z, k),
                *out = row_x(s, lambda, k - 1);
         memcpy(x, f->x + (ptrdiff_t)k * s->ld_x, sizeof(double) * (size_t)n);
@@ -106,7 +110,10 @@ static void sweep_back(kalman *f, const qp_stage *stages, double *w, double *lam
                                     y, f->row);
         memset(f->lambda, 0, sizeof(double) * (size_t)ld_d);
         memcpy(f->lambda, f->eta, sizeof(double) * (size_t)n);
-        s->kernels->add_transposed(n, n, 1, kalman_U_of(f, k), ld_d, f->row, f->lambda);
+        s->kernels->add_transposed(n_b, n_b, 1, U, ld_d, f->row, f->lambda);
+        for (int32_t i = n_b; i < n; i++) {
+            f->lambda[i] += U[i * (ld_d + 1)] * f->row[i];
+        }
         memcpy(out, f->eta, sizeof(double) * (size_t)s->ld_x);
         memcpy(out, f->lambda, sizeof(double) * (size_t)n);
         const double *beta = stages[k - 1].by_control + n,

@@ -23,12 +23,12 @@ static double finiteness(const double *values, int32_t n) {
     return sum;
 }
 
-/* The same where nothing but the block of the dense states and diagonals can stand in H; its other
+/* The same where nothing but the block of the tied states and diagonals can stand in H; its other
  * entries are 0 for good. */
 static double pack_separable(const rti_solver *s, const rti_worker *of, int32_t has_u,
                              qp_stage *stage) {
     const int32_t n_x = s->shape.n_x, n_u = s->shape.n_u, ld = s->shape.ld_z;
-    const int32_t n = s->shape.n_dense;
+    const int32_t n = s->shape.n_tied;
     const double scale = s->scale;
     double sum = finiteness(of->grad_x, n_x) + (has_u ? finiteness(of->grad_u, n_u) : 0);
     for (int32_t i = 0; i < n; i++) {
@@ -176,7 +176,8 @@ typedef struct task {
 static mhe_stage_values values_wanted(const rti_worker *to, int32_t wanted, int32_t has_u,
                                       const qp_shape *shape, double *cost) {
     const int32_t has_p = shape->n_p > 0, separable = shape->separable;
-    mhe_stage_values out = {.size = sizeof out};
+    /* Workers' matrices are 0 at first, and nothing but evaluate() writes there. */
+    mhe_stage_values out = {.size = sizeof out, .hess_clear = 1};
     if (has_p && (wanted & RTI_DERIVATIVES)) {
         const int32_t costs = wanted & RTI_COSTS, dynamics = wanted & RTI_DYNAMICS;
         out.grad_p = costs ? to->grad_p : NULL;

@@ -2,6 +2,8 @@
 /* sqp.c: a solve: preparation, start, iterations, result. */
 #include "rti.h"
 
+#include "../constant_rows.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -310,9 +312,10 @@ mhe_status rti_solve(void *self, const mhe_solve_control *control, mhe_solution 
         info->outcome = MHE_SOLVE_INFEASIBLE;
         return MHE_OK;
     }
-    if (n_free < s->shape.N * s->shape.n_x) {
+    const int32_t n_equations = s->shape.N * s->shape.n_x;
+    if (n_free < n_equations && n_free < n_equations - constant_rows(s->problem, NULL)) {
         return mhe_fail(err, MHE_E_ARGUMENT, "%d free variables cannot satisfy %d constraints",
-                        (int)n_free, (int)(s->shape.N * s->shape.n_x));
+                        (int)n_free, (int)n_equations);
     }
     if (!read_start(s, solution)) {
         return mhe_fail(err, MHE_E_ARGUMENT, "the start of the solve is not finite");

@@ -50,6 +50,20 @@ static int32_t has_diagonal_costs(const mhe_stage_problem *p, int32_t n_dense) {
     return 1;
 }
 
+/* Dense states before a tail of those whose costs are squares of each alone: of velocities, as a
+ * rule. */
+static int32_t count_tied(const mhe_stage_problem *p, int32_t n_dense) {
+    int32_t n = n_dense, alone = 1;
+    while (n > 0 && alone) {
+        for (int32_t j = 0; j < n_dense; j++) {
+            alone &= j == n - 1 ||
+                     !(p->xx_pattern[(n - 1) * p->n_x + j] || p->xx_pattern[j * p->n_x + n - 1]);
+        }
+        n -= alone;
+    }
+    return n;
+}
+
 void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape *shape) {
     const int32_t n_x = problem->n_x, n_u = problem->n_u;
     *shape = (qp_shape){.N = problem->n_intervals,
@@ -73,6 +87,7 @@ void qp_shape_of(const mhe_stage_problem *problem, int32_t *control_of, qp_shape
     }
     shape->separable =
         (shape->in_order || shape->n_dense == n_x) && has_diagonal_costs(problem, shape->n_dense);
+    shape->n_tied = shape->separable ? count_tied(problem, shape->n_dense) : shape->n_dense;
 }
 
 /* D and d of a stage, and its list of parameters, to the next multiple of 8. */
@@ -219,14 +234,14 @@ void qp_add_curvature(const qp_shape *s, const qp_stage *stage, double factor, c
         s->kernels->add_transposed(s->n_z, s->n_z, factor, stage->H, s->ld_z, w, w_out);
         return;
     }
-    const int32_t first = s->n_u, end = s->n_u + s->n_dense;
+    const int32_t first = s->n_u, end = s->n_u + s->n_tied;
     for (int32_t i = 0; i < first; i++) {
         w_out[i] += factor * stage->H[(ptrdiff_t)i * (s->ld_z + 1)] * w[i];
     }
     for (int32_t i = end; i < s->n_z; i++) {
         w_out[i] += factor * stage->H[(ptrdiff_t)i * (s->ld_z + 1)] * w[i];
     }
-    s->kernels->add_transposed(s->n_dense, s->n_dense, factor, stage->H + first * s->ld_z + first,
+    s->kernels->add_transposed(s->n_tied, s->n_tied, factor, stage->H + first * s->ld_z + first,
                                s->ld_z, w + first, w_out + first);
 }
 
@@ -252,10 +267,10 @@ void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const 
         if (w != NULL) {
             qp_add_curvature(s, &stages[k], 1, w + (ptrdiff_t)k * s->ld_z, slope);
         }
-        for (int32_t i = 0; k > 0 && i < s->n_x; i++) {
+        for (int32_t i = 0; lambda != NULL && k > 0 && i < s->n_x; i++) {
             slope[s->n_u + i] += lambda[(ptrdiff_t)(k - 1) * s->ld_x + i];
         }
-        if (k < s->N) {
+        if (lambda != NULL && k < s->N) {
             qp_backward(s, &stages[k], -1, lambda + (ptrdiff_t)k * s->ld_x, slope);
         }
     }

@@ -36,6 +36,7 @@ typedef struct qp_shape {
     /* Costs hold no products of a control or one of those states with anything else, and each of
      * those states has a control that no other one has: kalman.h. */
     int32_t separable;
+    int32_t n_tied; /* of a separable one: dense states from here on, too, have squares alone */
     const kernels *kernels;
 } qp_shape;
 
@@ -93,7 +94,7 @@ void qp_add_costs_p(const qp_shape *s, const qp_stage *stage, const double *w, c
 void qp_sum_p(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out);
 /* Slope of the Lagrangian without bounds: out = H w + g + (lambda_{k-1} on x) - F^T lambda_k, all
- * stages. `w` NULL: 0. */
+ * stages. `w` NULL: 0; `lambda` NULL: 0, without parameters. */
 void qp_slope(const qp_shape *s, const qp_stage *stages, const double *w, const double *lambda,
               double *out);
 /* gap [size_x] = F_k w_k + P_k p + b_k - x_{k+1} */

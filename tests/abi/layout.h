@@ -404,7 +404,7 @@ SIZE(mhe_own_costs, 24);
 AT(mhe_own_costs, data, 8);
 AT(mhe_own_costs, find, 16);
 
-SIZE(mhe_kinematics, 88);
+SIZE(mhe_kinematics, 96);
 AT(mhe_kinematics, size, 0);
 AT(mhe_kinematics, mass, 8);
 AT(mhe_kinematics, bias, 16);
@@ -416,6 +416,7 @@ AT(mhe_kinematics, marker_q, 56);
 AT(mhe_kinematics, body, 64);
 AT(mhe_kinematics, body_q, 72);
 AT(mhe_kinematics, dependent, 80);
+AT(mhe_kinematics, lengths_clear, 88);
 
 SIZE(mhe_load, 12);
 AT(mhe_load, body, 0);
@@ -616,7 +617,7 @@ AT(mhe_integrator_ops, step, 40);
 AT(mhe_integrator_ops, memory_size, 48);
 AT(mhe_integrator_ops, accepts, 56);
 
-SIZE(mhe_stage_values, 120);
+SIZE(mhe_stage_values, 128);
 AT(mhe_stage_values, size, 0);
 AT(mhe_stage_values, cost, 8);
 AT(mhe_stage_values, grad_x, 16);
@@ -632,6 +633,7 @@ AT(mhe_stage_values, grad_p, 88);
 AT(mhe_stage_values, hess_px, 96);
 AT(mhe_stage_values, hess_pu, 104);
 AT(mhe_stage_values, hess_pp, 112);
+AT(mhe_stage_values, hess_clear, 120);
 
 SIZE(mhe_low_rank, 8);
 AT(mhe_low_rank, size, 0);

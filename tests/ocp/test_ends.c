@@ -45,6 +45,32 @@ static void test_too_many_fixed(void **state) {
     rig_close_both(&r, &t);
 }
 
+/* With the controls and all states given no equation takes a variable away: the dynamics hold there
+ * or they do not. */
+static void test_all_given(void **state) {
+    (void)state;
+    toy t;
+    rig r;
+    rig_open_pendulum(&r, &t, 3, "{}");
+    for (int k = 0; k < 3; k++) {
+        *toy_u_lower(&t, k) = *toy_u_upper(&t, k) = 0.5 - 0.3 * k;
+    }
+    assert_int_equal(rig_solve(&r, NULL), MHE_OK);
+    assert_int_equal(r.info.outcome, MHE_SOLVE_CONVERGED);
+    for (int k = 1; k <= 3; k++) {
+        for (int i = 0; i < 2; i++) {
+            toy_x_lower(&t, k)[i] = toy_x_upper(&t, k)[i] = r.at.x[2 * k + i];
+        }
+    }
+    assert_int_equal(rig_solve(&r, NULL), MHE_OK);
+    assert_int_equal(r.info.outcome, MHE_SOLVE_CONVERGED);
+    toy_x_lower(&t, 2)[0] = toy_x_upper(&t, 2)[0] = r.at.x[4] + 0.1;
+    assert_int_equal(rig_solve(&r, NULL), MHE_OK);
+    assert_int_equal(r.info.outcome, MHE_SOLVE_INFEASIBLE);
+    assert_true(r.info.primal_residual > 0.05);
+    rig_close_both(&r, &t);
+}
+
 /* Steps into a region without values are shortened. */
 static void test_retry(void **state) {
     (void)state;
@@ -170,6 +196,7 @@ int main(void) {
         cmocka_unit_test(test_bounds_that_contradict),
         cmocka_unit_test(test_out_of_reach),
         cmocka_unit_test(test_too_many_fixed),
+        cmocka_unit_test(test_all_given),
         cmocka_unit_test(test_retry),
         cmocka_unit_test(test_no_value_at_start),
         cmocka_unit_test(test_nan_objective),

@@ -112,8 +112,8 @@ typedef struct mhe_stage {
                              * of an entry's targets since the start, with what it may be while
                              * little was seen (0.1, with data.rates 0.05, of which e^-t is left
                              * after t half seconds); of markers how far all were from the estimates
-                             * (RMS of a coordinate, m), with data.rates from the postures nearest
-                             * to them; NaN: not known. May be NULL */
+                             * (RMS of a coordinate, m), with data.rates or data.marker_offset from
+                             * the postures nearest to them; NaN: not known. May be NULL */
 } mhe_stage;
 
 /* Is an entry the one of that name, or one of its axes ("STER.x" of "STER")? [any] */

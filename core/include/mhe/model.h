@@ -34,6 +34,9 @@ typedef struct mhe_kinematics {
     double *body_q; /* [n_b x 6 x n_q]: angular velocity and velocity of the body's origin, in
                      * ground axes, per unit of each coordinate's rate */
     double *dependent; /* values of the dependent coordinates [n_dependents], rad (m) */
+    /* 1: length_q and length_qq hold 0 already wherever a path cannot depend on a coordinate
+     * (path_pattern); elsewhere there may be anything. A model may pass over those entries. */
+    int32_t lengths_clear;
 } mhe_kinematics;
 
 /* Rows of a description's loops, loop by loop: three of a point, six of a weld (the point's first).

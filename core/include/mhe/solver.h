@@ -45,6 +45,9 @@ typedef struct mhe_stage_values {
     double *hess_px; /* [n_p x n_x] */
     double *hess_pu; /* [n_p x n_u] */
     double *hess_pp; /* [n_p x n_p] */
+    /* 1: hess_xx, hess_ux and hess_uu hold 0 already outside of their patterns, and an evaluation
+     * may pass over those entries. */
+    int32_t hess_clear;
 } mhe_stage_values;
 
 /* Told where B = D + C V^T at every node: D has at most one entry a column, n_directions is the

@@ -19,7 +19,21 @@ int mhi_cholesky_factor(double *A, int32_t n) {
             return -1;
         }
         row_j[j] = 1 / sqrt(pivot);
-        for (int32_t i = j + 1; i < n; i++) {
+        int32_t i = j + 1;
+        for (; i + 4 <= n; i += 4) { /* four rows at a time: a sum has to wait for itself */
+            double *rows = A + i * n,
+                   sum[4] = {rows[j], rows[n + j], rows[2 * n + j], rows[3 * n + j]};
+            for (int32_t k = 0; k < j; k++) {
+                sum[0] -= rows[k] * row_j[k];
+                sum[1] -= rows[n + k] * row_j[k];
+                sum[2] -= rows[2 * n + k] * row_j[k];
+                sum[3] -= rows[3 * n + k] * row_j[k];
+            }
+            for (int32_t r = 0; r < 4; r++) {
+                rows[r * n + j] = sum[r] * row_j[j];
+            }
+        }
+        for (; i < n; i++) {
             double *row_i = A + i * n;
             double sum = row_i[j];
             for (int32_t k = 0; k < j; k++) {
@@ -48,7 +62,7 @@ static void scale(double *row, double factor, int32_t n) {
 __attribute__((always_inline)) static inline void solve_strip(int32_t wide, const double *L,
                                                               int32_t n, double *B, int32_t ld) {
     for (int32_t i = 0; i < n; i++) {
-        lanes sum[4];
+        lanes sum[8];
         for (int32_t c = 0; c < wide; c++) {
             sum[c] = *(lanes *)(B + i * ld + 4 * c);
         }
@@ -62,7 +76,7 @@ __attribute__((always_inline)) static inline void solve_strip(int32_t wide, cons
         }
     }
     for (int32_t i = n - 1; i >= 0; i--) {
-        lanes sum[4];
+        lanes sum[8];
         for (int32_t c = 0; c < wide; c++) {
             sum[c] = *(lanes *)(B + i * ld + 4 * c);
         }
@@ -96,6 +110,9 @@ static void solve_column(const double *L, int32_t n, double *B, int32_t ld) {
 
 CLONES static void solve_columns(const double *L, int32_t n, double *B, int32_t n_columns) {
     int32_t c = 0;
+    for (; c + 32 <= n_columns; c += 32) {
+        solve_strip(8, L, n, B + c, n_columns);
+    }
     for (; c + 16 <= n_columns; c += 16) {
         solve_strip(4, L, n, B + c, n_columns);
     }

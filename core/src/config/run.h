@@ -54,6 +54,7 @@ typedef struct mhi_data_section {
     mhe_text_map labels;    /* name in the file: name in the model */
     mhe_text_map marker_weights; /* marker or pattern: weight; MHI_MARKER_TASK_FILE: a path */
     int32_t rates;               /* 1: the markers tell joint velocities, too */
+    double marker_offset;        /* m, sd of offsets that are learnt; 0: none are */
     const char *subject;         /* whose labels ("NAME:MARKER") are read; NULL: there is one */
 } mhi_data_section;
 

@@ -84,6 +84,11 @@ static const mhe_option data_options[] = {
                  "Joint velocities by inverse kinematics (or the measured angles) from frame to "
                  "frame, which the signal qdot is to be close to where a cost follows it: they "
                  "keep light segments from swinging between the frames."),
+    MHE_OPT_REAL(
+        mhi_data_section, marker_offset, 0, 0, 1, "m",
+        "How far markers may be from their places in their segments (standard deviation of "
+        "a coordinate): what stays the same while the limbs turn is learnt as the "
+        "recording runs and taken off the markers; 0: nothing is."),
     MHE_OPT_TEXT(mhi_data_section, subject, 0, NULL,
                  "Whose columns are read where a file holds several people (NAME:MARKER)."),
 };

@@ -120,13 +120,13 @@ static mhe_status find_node(mhe_estimator *e, double time, int32_t *used, mhe_er
     return MHE_OK;
 }
 
-/* The velocities that the newest node's markers and angles say. The posture is looked for near the
- * last one, at first near what the model stands at. */
+/* The posture that the newest node's markers and angles say, and their velocities. The posture is
+ * looked for near the last one, at first near what the model stands at. */
 static void take_rates(mhe_estimator *e, int32_t k) {
     const mhi_channel *markers = mhi_channels_find(&e->channels, MHI_SIGNAL_MARKERS);
     const mhi_channel *angles = mhi_channels_find(&e->channels, MHI_SIGNAL_Q);
     mhi_channel *rates = mhi_channels_find(&e->channels, MHI_SIGNAL_QDOT);
-    if (rates == NULL) {
+    if (e->rates.start == NULL) {
         return;
     }
     double *near = e->begin.near;
@@ -166,7 +166,9 @@ static void take_frame(mhe_estimator *e, const mhe_frame *frame, int32_t used) {
     for (int32_t i = 0; i < channels->n; i++) {
         mhi_trust_drop(&e->trust, &channels->rows[i], e->window.filled - 1);
     }
-    take_rates(e, e->window.filled - 1);
+    if (used) {
+        take_rates(e, e->window.filled - 1);
+    }
 }
 
 /* How far the markers stay from the model: what costs may take for their noise. */

@@ -8,18 +8,23 @@ mhe_status mhi_rates_create(mhi_rates *r, const mhi_run *run, const mhi_system *
                             mhi_system_context *context, const mhi_tasks *tasks, int32_t nodes,
                             mhi_arena *arena, mhe_error *err) {
     const int32_t n_q = mhi_system_face(system)->n_q;
+    const int32_t n_k = mhi_system_description(system)->n_markers;
     *r = (mhi_rates){.n_q = n_q, .nodes = nodes, .nearest = INFINITY};
-    if (!run->data.rates) {
+    if (!run->data.rates && run->data.marker_offset == 0) {
         return MHE_OK;
     }
-    r->q = MHI_TAKE(arena, double, nodes *n_q);
-    r->found = MHI_TAKE(arena, double, n_q);
-    r->v = MHI_TAKE(arena, double, n_q);
-    if (r->q == NULL || r->found == NULL || r->v == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    const mhi_room rooms[] = {
+        {&r->q, (ptrdiff_t)nodes * n_q}, {&r->found, n_q}, {&r->v, n_q}, {&r->corrected, 3 * n_k}};
+    mhe_status status = MHI_TAKE_ROOMS(arena, rooms, err);
+    if (status == MHE_OK) {
+        status = mhi_offsets_create(&r->offsets, run->data.marker_offset, system, context, tasks,
+                                    nodes, arena, err);
+    }
+    if (status != MHE_OK) {
+        return status;
     }
     mhi_rates_clear(r);
-    const mhe_status status = mhi_start_create(system, context, &r->start, err);
+    status = mhi_start_create(system, context, &r->start, err);
     if (status == MHE_OK) {
         mhi_start_set_tasks(r->start, tasks);
         mhi_start_set_enough(r->start, 1e-6);
@@ -39,6 +44,7 @@ static void forget(mhi_rates *r, int32_t k) {
     for (int32_t i = 0; i < r->n_q; i++) {
         posture(r, k)[i] = NAN;
     }
+    mhi_offsets_forget(&r->offsets, k);
 }
 
 void mhi_rates_clear(mhi_rates *r) {
@@ -50,6 +56,7 @@ void mhi_rates_clear(mhi_rates *r) {
 void mhi_rates_shift(mhi_rates *r) {
     if (r->q != NULL) {
         memmove(r->q, posture(r, 1), sizeof(double) * (size_t)((r->nodes - 1) * r->n_q));
+        mhi_offsets_shift(&r->offsets);
         forget(r, r->nodes - 1);
     }
 }
@@ -75,7 +82,7 @@ static void slope(mhi_rates *r, int32_t a, int32_t b, const double *times) {
 }
 
 static void put(mhi_rates *r, mhi_channel *c, int32_t k) {
-    if (any(r, r->v)) {
+    if (c != NULL && any(r, r->v)) {
         mhi_channel_set(c, k, r->v);
     }
 }
@@ -92,11 +99,9 @@ static void expect(mhi_rates *r, int32_t k, const double *times, const double *n
     }
 }
 
-/* The posture by inverse kinematics, if one comes near. */
-static void find_posture(mhi_rates *r, int32_t k, const double *times, const double *markers,
-                         const double *near, double outlier) {
+/* The posture by inverse kinematics, if one comes near, from where it is expected. */
+static void find_posture(mhi_rates *r, int32_t k, const double *markers, double outlier) {
     double distance = NAN;
-    expect(r, k, times, near);
     const mhe_status status = (isfinite(r->nearest) ? mhi_start_posture : mhi_start_search)(
         r->start, markers, r->found, &distance, NULL);
     /* a frame that no posture comes near, where others fit, was not measured well */
@@ -108,16 +113,33 @@ static void find_posture(mhi_rates *r, int32_t k, const double *times, const dou
     }
 }
 
+/* The same, by markers without what is known of their offsets, of which it tells more. */
+static void take_posture(mhi_rates *r, int32_t k, const double *times, const double *markers,
+                         const double *near, double outlier) {
+    expect(r, k, times, near);
+    if (r->offsets.sd == 0) {
+        find_posture(r, k, markers, outlier);
+        return;
+    }
+    mhi_offsets_turn(&r->offsets, k, r->found);
+    mhi_offsets_correct(&r->offsets, k, markers, r->corrected);
+    find_posture(r, k, r->corrected, outlier);
+    if (any(r, posture(r, k))) {
+        mhi_offsets_learn(&r->offsets, k, markers, r->q);
+    }
+}
+
 void mhi_rates_take(mhi_rates *r, int32_t k, const double *times, const double *markers,
                     const double *angles, const double *near, double outlier, mhi_channel *c) {
     if (r->start == NULL) {
         return;
     }
     forget(r, k);
-    find_posture(r, k, times, markers, near, outlier);
+    take_posture(r, k, times, markers, near, outlier);
     for (int32_t i = 0; i < r->n_q && angles != NULL; i++) {
         if (!isnan(angles[i])) {
             posture(r, k)[i] = angles[i];
+            mhi_offsets_hold(&r->offsets, k, i);
         }
     }
     if (k > 0) {

@@ -113,6 +113,9 @@ void mhi_window_set_targets(mhe_estimator *e) {
             if (target != NULL) {
                 memcpy(target, mhi_row(c->believed, k, c->face.width),
                        sizeof(double) * (size_t)c->face.width);
+                if (c->signal == MHI_SIGNAL_MARKERS && e->rates.offsets.sd > 0) {
+                    mhi_offsets_correct(&e->rates.offsets, k, target, target);
+                }
             }
         }
     }

@@ -139,7 +139,8 @@ static mhe_status kinematics(mhi_system_context *c, const double *q, const doubl
                                 .length = own ? c->length : NULL,
                                 .length_q = own ? c->length_q : NULL,
                                 .length_qq = own && derivatives ? c->length_qq : NULL,
-                                .body = c->system->most_pairs > 0 ? c->body : NULL};
+                                .body = c->system->most_pairs > 0 ? c->body : NULL,
+                                .lengths_clear = 1}; /* nobody else writes there */
     const mhe_status status = c->system->model->kinematics(c->model, q, v, &out, err);
     return status != MHE_OK || own ? status
                                    : mhi_anatomy_lengths(c->anatomy, q, v, c->length, c->length_q,
@@ -162,9 +163,9 @@ static inline void torque_derivative(const mhi_system_context *c, const double *
 }
 
 /* M^-1 of the torques' derivatives by q and v, and M^-1 itself, in one solve with the factor of M
- * in place: c->solved [n_q x 3 n_q]. */
+ * in place: c->solved [n_q x 3 n_q], its rows filled up to whole fours. */
 static void solve_derivatives(mhi_system_context *c) {
-    const int32_t n_q = c->system->face.n_q, ld = 3 * n_q;
+    const int32_t n_q = c->system->face.n_q, ld = MHI_SOLVED_LD(n_q);
     const double *other_q = c->system->n_forces > 0 ? c->other_q : NULL;
     const double *other_v = c->system->forces_see_rates ? c->other_v : NULL;
     torque_derivative(c, c->moment_q, other_q, c->tau_q, c->solved, ld);
@@ -180,14 +181,35 @@ static void solve_derivatives(mhi_system_context *c) {
 static void copy_solved(const mhi_system_context *c, int32_t block, double *out) {
     const int32_t n_q = c->system->face.n_q;
     for (int32_t i = 0; i < n_q; i++) {
-        memcpy(out + i * n_q, c->solved + i * 3 * n_q + block * n_q, doubles(n_q));
+        memcpy(out + i * n_q, c->solved + i * MHI_SOLVED_LD(n_q) + block * n_q, doubles(n_q));
     }
 }
 
 static void acceleration_by_force(mhi_system_context *c, const double *by, const int32_t *muscle,
                                   int32_t n, double *out) {
     const int32_t n_q = c->system->face.n_q;
-    mhi_path_accelerations(c, c->solved + 2 * n_q, 3 * n_q, by, muscle, n, out);
+    mhi_path_accelerations(c, c->solved + 2 * n_q, MHI_SOLVED_LD(n_q), by, muscle, n, out);
+}
+
+/* By residual torques, which M^-1 answers, and the controls of actuators. */
+static void residual_accelerations(mhi_system_context *c, double *out) {
+    const mhi_system *s = c->system;
+    const int32_t n_q = s->face.n_q, n_r = s->face.n_r;
+    if (s->n_actuators == 0) {
+        for (int32_t i = 0; i < n_q; i++) {
+            memcpy(out + i * n_r, c->solved + i * MHI_SOLVED_LD(n_q) + 2 * n_q, doubles(n_r));
+        }
+        return;
+    }
+    memset(out, 0, doubles(n_q * n_r));
+    for (int32_t i = 0; i < s->n_residual; i++) {
+        out[i * n_r + i] = 1;
+    }
+    for (int32_t i = 0; i < n_q; i++) {
+        memcpy(out + i * n_r + s->n_residual, c->drive_r + i * s->n_actuators,
+               doubles(s->n_actuators));
+    }
+    mhi_cholesky_solve(c->mass, n_q, out, n_r);
 }
 
 static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_system_point *at,
@@ -241,15 +263,7 @@ static mhe_status acceleration_derivatives(mhi_system_context *c, const mhe_syst
         mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_p, f->n_p);
     }
     if (out->vdot_r != NULL && f->n_r > 0) {
-        memset(out->vdot_r, 0, doubles(n_q * f->n_r));
-        for (int32_t i = 0; i < s->n_residual; i++) {
-            out->vdot_r[i * f->n_r + i] = 1;
-        }
-        for (int32_t i = 0; i < n_q && s->n_actuators > 0; i++) {
-            memcpy(out->vdot_r + i * f->n_r + s->n_residual, c->drive_r + i * s->n_actuators,
-                   doubles(s->n_actuators));
-        }
-        mhi_cholesky_solve(c->mass, n_q, out->vdot_r, f->n_r);
+        residual_accelerations(c, out->vdot_r);
         mhi_loops_closed(c, MHI_LOOPS_BY_OTHER, out->vdot_r, f->n_r);
     }
     return MHE_OK;

@@ -277,7 +277,7 @@ static mhe_status take_arrays(mhi_system_context *c, mhe_error *err) {
                               {&c->moment, n_q},
                               {&c->moment_q, n_q * n_q},
                               {&c->moment_v, n_q * n_q},
-                              {&c->solved, 3 * n_q * n_q},
+                              {&c->solved, MHI_SOLVED_LD(n_q) * n_q},
                               {&c->tau_q, n_q * n_q},
                               {&c->tau_v, n_q * n_q},
                               {&c->other, other},

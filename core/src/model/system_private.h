@@ -54,6 +54,9 @@ struct mhi_system {
     mhi_arena arena;
 };
 
+/* Three blocks of columns, to whole fours: no solution for a single column. */
+#define MHI_SOLVED_LD(n_q) ((3 * (n_q) + 3) / 4 * 4)
+
 struct mhi_system_context {
     const mhi_system *system;
     void *model;
@@ -78,7 +81,7 @@ struct mhi_system_context {
     double *push, *push_d, *push_w;         /* [most_pairs x 6], [most_pairs x 6 x 6] */
     double *pair_rows, *pair_loads;         /* [most_pairs x 6 x n_q], [n_q x 36] */
     double *pair_q, *pair_work, *pair_turn; /* [n_q x n_q], [18 x n_q], [3 x n_q] */
-    double *solved;                         /* [n_q x 3 n_q] vdot by q, by v, by torques */
+    double *solved;                         /* [n_q x MHI_SOLVED_LD] vdot by q, by v, by torques */
     double *row_q, *row_v;                  /* [n_q] */
     double *all_force_p, *all_rate_p; /* of the plugin's parameters [n x n_m], [n x n_s x n_m] */
     double *force_p, *moment_p;       /* [n_p], [n_q x n_p] */

@@ -4,12 +4,15 @@
 
 #include "base/values.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* Full square block [n x n] of the variables from `first` on, from the lower triangle. */
 static void mirror(const mhi_ocp *ocp, const double *hessian, int32_t n_z, int32_t first, int32_t n,
-                   double *block) {
-    memset(block, 0, sizeof(double) * (size_t)(n * n));
+                   int32_t is_clear, double *block) {
+    if (!is_clear) {
+        memset(block, 0, sizeof(double) * (size_t)(n * n));
+    }
     for (int32_t i = 0; i < n; i++) {
         const double *row = hessian + (first + i) * n_z + first;
         const int32_t reach = ocp->reach[first + i] - first;
@@ -33,9 +36,11 @@ static void clear(const mhi_ocp *ocp, int32_t n_z, double *hessian) {
 
 /* Rows of the variables from `first` on, columns of x. */
 static void copy_rows(const mhi_ocp *ocp, const double *hessian, int32_t n_z, int32_t first,
-                      int32_t n, double *block) {
+                      int32_t n, int32_t is_clear, double *block) {
     const int32_t n_x = ocp->n_x;
-    memset(block, 0, sizeof(double) * (size_t)(n * n_x));
+    if (!is_clear) {
+        memset(block, 0, sizeof(double) * (size_t)(n * n_x));
+    }
     for (int32_t i = 0; i < n; i++) {
         for (int32_t j = ocp->reach[first + i]; j < n_x; j++) {
             block[i * n_x + j] = hessian[(first + i) * n_z + j];
@@ -48,6 +53,7 @@ static void copy_rows(const mhi_ocp *ocp, const double *hessian, int32_t n_z, in
 static void spread(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
                    const mhe_stage_values *out) {
     const int32_t n_x = ocp->n_x, n_u = n_z > n_x ? ocp->face.n_u : 0;
+    const int32_t is_clear = out->size > offsetof(mhe_stage_values, hess_clear) && out->hess_clear;
     if (ocp->signals.n_carried > 0) {
         mhi_ocp_spread_carried(ocp, w, out);
     } else {
@@ -55,17 +61,17 @@ static void spread(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
             memcpy(out->grad_x, w->gradient, sizeof(double) * (size_t)n_x);
         }
         if (out->hess_xx != NULL) {
-            mirror(ocp, w->hessian, n_z, 0, n_x, out->hess_xx);
+            mirror(ocp, w->hessian, n_z, 0, n_x, is_clear, out->hess_xx);
         }
         if (out->hess_ux != NULL && n_u > 0) {
-            copy_rows(ocp, w->hessian, n_z, n_x, n_u, out->hess_ux);
+            copy_rows(ocp, w->hessian, n_z, n_x, n_u, is_clear, out->hess_ux);
         }
     }
     if (out->grad_u != NULL && n_u > 0) {
         memcpy(out->grad_u, w->gradient + n_x, sizeof(double) * (size_t)n_u);
     }
     if (out->hess_uu != NULL && n_u > 0) {
-        mirror(ocp, w->hessian, n_z, n_x, n_u, out->hess_uu);
+        mirror(ocp, w->hessian, n_z, n_x, n_u, is_clear, out->hess_uu);
     }
 }
 

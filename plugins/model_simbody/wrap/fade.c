@@ -58,6 +58,17 @@ double wrap_outside(const wrap_surface *surface, const double *x) {
     }
 }
 
+double wrap_outside_derivatives(const wrap_surface *surface, const double *x, double *g,
+                                double *h) {
+    jet off;
+    outside_jet(surface, x, x, 0, &off);
+    memcpy(g, off.slope, 3 * sizeof *g);
+    for (int i = 0; i < 3; i++) {
+        memcpy(h + 3 * i, off.curve[i], 3 * sizeof *h);
+    }
+    return off.value;
+}
+
 int wrap_clears(const wrap_surface *surface, double *x) {
     const double *size = surface->size;
     double middle[3] = {0, 0, 0}, d[3], weight[3] = {1, 1, 1}, square = 0;

@@ -13,7 +13,8 @@
  *     the pass between both higher, by b:          E - F + F S(b / (l F))
  * so that what ends inside fades the faster the less it is; the slope does not exceed 15 / (8 k).
  * Where the way round a cylinder turns about, both excesses fade so and their mean counts (side.h).
- * An end that stays where it is on the obstacle's body never comes in, and fades nothing. */
+ * An end that stays where it is on the obstacle's body never comes in, and fades nothing. The first
+ * of these is done here where a path has one obstacle, else of whole courses (release.c). */
 #ifndef SIMBODY_FADE_H
 #define SIMBODY_FADE_H
 
@@ -42,6 +43,9 @@ void wrap_both_ways(const wrap_surface *surface, const double *p, const double *
 
 /* Distance of a point from the surface, < 0 inside; from an ellipsoid roughly, 0 where it is 0. */
 double wrap_outside(const wrap_surface *surface, const double *x);
+
+/* That with gradient [3] and second derivatives [9]. */
+double wrap_outside_derivatives(const wrap_surface *surface, const double *x, double *g, double *h);
 
 /* Moves a point that is inside the obstacle, or hardly outside, to beside it, along the shortest
  * way or nearly so; 1: it was. */

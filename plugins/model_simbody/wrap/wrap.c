@@ -19,7 +19,7 @@ int wrap_solve(const wrap_surface *surface, const double *p, const double *s,
     case MHE_OBSTACLE_SPHERE:
         return wrap_sphere(surface, p, s, out);
     case MHE_OBSTACLE_CYLINDER:
-        return wrap_cylinder(surface, p, s, out);
+        return wrap_cylinder(surface, p, s, guess, out);
     case MHE_OBSTACLE_ELLIPSOID:
         return wrap_ellipsoid(surface, p, s, guess, out);
     default:
@@ -191,6 +191,7 @@ static void cylinder_string(const wrap_surface *surface, const double *p, const 
     double rise = s[2] - p[2], length = sqrt(across * across + rise * rise),
            stretch = length / across;
     double at[2] = {ring.start, ring.start + sense * ring.turn}, *points[2] = {out->a, out->b};
+    out->way = sense > 0 ? 1 : -1;
     points[0][2] = p[2] + rise * ring.straight[0] / across;
     points[1][2] = s[2] - rise * ring.straight[1] / across;
     for (int k = 0; k < 2; k++) {
@@ -223,7 +224,8 @@ void wrap_both_ways(const wrap_surface *surface, const double *p, const double *
     side_rising_jet(surface, p, s, &lengths[0], &lengths[1], share);
 }
 
-int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out) {
+int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
+                  const wrap_string *guess, wrap_string *out) {
     double square = surface->size[0] * surface->size[0];
     if (p[0] * p[0] + p[1] * p[1] <= square || s[0] * s[0] + s[1] * s[1] <= square) {
         return WRAP_INSIDE;
@@ -231,6 +233,10 @@ int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
     int needs = cylinder_needs(surface, p, s), between = 0;
     if (needs == WRAP_NONE) {
         return WRAP_NONE;
+    }
+    if (guess != NULL && guess->keeps) {
+        cylinder_string(surface, p, s, guess->way, out);
+        return wrap_is_off(surface, out) ? WRAP_NONE : needs;
     }
     double rising = p[0] * s[1] - p[1] * s[0] < 0 ? 0 : 1; /* the short way */
     if (surface->side_axis == 0 || surface->side_axis == 1) {

@@ -30,6 +30,8 @@ typedef struct wrap_string {
     double arc;              /* length on the surface */
     double field[4];         /* j, j' at b of (1, 0) at a; of (0, 1) at a */
     int32_t held;            /* WRAP_HELD: a shorter one may lie on the other side than asked for */
+    int32_t way;             /* round a cylinder: 1: of growing angles, -1: of falling ones */
+    int32_t keeps;           /* of a guess: 1: the string goes that way */
     double other;            /* how much the other way round a cylinder counts, 0 .. 0.5 */
 } wrap_string;
 
@@ -60,7 +62,8 @@ void wrap_curvature(const wrap_string *string, double *pp, double *ps, double *s
 
 /* Of the kinds; as wrap_solve(). */
 int wrap_sphere(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
-int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s, wrap_string *out);
+int wrap_cylinder(const wrap_surface *surface, const double *p, const double *s,
+                  const wrap_string *guess, wrap_string *out);
 int wrap_ellipsoid(const wrap_surface *surface, const double *p, const double *s,
                    const wrap_string *guess, wrap_string *out);
 int wrap_torus(const wrap_surface *surface, const double *p, const double *s,

@@ -70,7 +70,7 @@ static void make_shape(program *p, const recipe *r) {
                                      .xx_pattern = xx,
                                      .ux_pattern = ux,
                                      .uu_pattern = uu};
-    p->n_tied = r->separable ? n_x - simple : n_x;
+    p->n_tied = !r->separable ? n_x : whole(0, 1) ? n_x - simple : whole(0, n_x - simple);
     for (int i = 0; i < n_x; i++) {
         for (int j = 0; j < n_x; j++) {
             xx[i * n_x + j] = i == j || (i < p->n_tied && j < p->n_tied);
@@ -92,6 +92,8 @@ static void make_shape(program *p, const recipe *r) {
     }
     qp_shape_of(&p->problem, p->control_of, &p->shape);
     assert_true(p->shape.n_dense <= n_x - simple);
+    assert_true(p->shape.n_tied <= p->shape.n_dense);
+    assert_true(!p->shape.separable || p->shape.n_tied <= p->n_tied);
     assert_true(p->shape.separable || !r->separable || p->shape.n_dense < n_x - simple);
 }
 

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* offsets.h: how far each marker is from its place in its segment, learnt as the recording runs.
+ *
+ * A marker is fixed to its segment and the segment to its joints. Markers that are not where the
+ * model has them do not fit together, and do so in ever other ways as the limbs turn: no posture
+ * makes up for it. What the posture of each moment can follow is projected out of what is left of
+ * its markers; the rest is that of offsets that are the same at all moments, the least ones that
+ * explain it. Muscles have no part in it. */
+#ifndef MHI_OFFSETS_H
+#define MHI_OFFSETS_H
+
+#include "base/arena.h"
+#include "model/system.h"
+#include "ocp/tasks.h"
+
+/* What a posture says: left = jacobian dq + offsets, in the axes of the markers' bodies. n = 3 n_k.
+ */
+typedef struct mhi_offset_look {
+    double *q;        /* [n_q] */
+    double *measured; /* [n] markers, in ground; NaN: missing */
+    double *left;     /* [n] measured less the model's, 0 where it does not count */
+    double *weight;   /* [n] 0: missing or left out */
+    double *jacobian; /* [n x n_q] */
+    double *follow;   /* [n_q x n] how the nearest posture goes with the offsets */
+} mhi_offset_look;
+
+#define MHI_OFFSET_LOOKS 32
+
+typedef struct mhi_offsets {
+    double sd;        /* m, what is expected of an offset; 0: off */
+    double *value;    /* [n] in the axes of the markers' bodies, m */
+    double *rotation; /* [nodes x n_k x 9] to ground; the first NaN: not known */
+    double *follow;   /* [nodes x n_q x n] of the nodes' postures; 0: not known */
+    mhi_offset_look now, looks[MHI_OFFSET_LOOKS]; /* the older, the fewer */
+    int32_t n_looks, next;                        /* the one that is looked at again next */
+    double *normal, *right;                       /* [n x n], [n] of all looks */
+    double squares, rows;                         /* of what they left, over so many */
+    double *work, *change;                        /* [n x n], [n] scratch, as what follows */
+    double *marker, *slope, *body, *square, *column, *step;
+    const mhe_description *description;
+    mhi_system_context *context;
+    const mhi_tasks *tasks;
+    int32_t n_q, n_k, n, nodes;
+} mhi_offsets;
+
+/* Off where `sd` is 0 or there are no markers. [cold] */
+mhe_status mhi_offsets_create(mhi_offsets *offsets, double sd, const mhi_system *system,
+                              mhi_system_context *context, const mhi_tasks *tasks, int32_t nodes,
+                              mhi_arena *arena, mhe_error *err);
+void mhi_offsets_forget(mhi_offsets *offsets, int32_t k);
+void mhi_offsets_shift(mhi_offsets *offsets);
+/* Node k has the posture q: the axes of its bodies. */
+void mhi_offsets_turn(mhi_offsets *offsets, int32_t k, const double *q);
+/* The markers [n] of node k without their offsets -> out, may be the same; as they are where the
+ * node's posture is not known. */
+void mhi_offsets_correct(const mhi_offsets *offsets, int32_t k, const double *markers, double *out);
+/* Learns from node k: markers as measured, and in `q` [nodes x n_q] the posture nearest to them
+ * without their offsets. The postures of all nodes go along with what was learnt. */
+void mhi_offsets_learn(mhi_offsets *offsets, int32_t k, const double *markers, double *q);
+/* A coordinate of node k is measured otherwise: what is learnt does not move it. */
+void mhi_offsets_hold(mhi_offsets *offsets, int32_t k, int32_t coordinate);
+
+#endif
