@@ -136,7 +136,12 @@ static double faded_length(const path_route *route, const route_work *work,
     into_frame(frame, ends[1], s);
     into_frame(frame, string->a, local.a);
     into_frame(frame, string->b, local.b);
-    if (!wrap_fades(surface, p, s, moves, &local)) {
+    int holds = 0;
+    if (piece->joint[0] < 0 && piece->joint[1] < 0) {
+        holds = HOLD_ANY | (end_moves(route, piece, 0) ? HOLD_P : 0) |
+                (end_moves(route, piece, 1) ? HOLD_S : 0);
+    }
+    if (!wrap_fades(surface, p, s, moves, holds, &local)) {
         return -1;
     }
     for (int i = 0; i < 9; i++) {
@@ -146,7 +151,7 @@ static double faded_length(const path_route *route, const route_work *work,
         rotate3(transposed, string->t[k], local.t[k]);
         rotate3(transposed, string->n[k], local.n[k]);
     }
-    double length = wrap_faded(surface, p, s, moves, &local, g, pp, ps, ss);
+    double length = wrap_faded(surface, p, s, moves, holds, &local, g, pp, ps, ss);
     if (g != NULL) {
         rotate3(frame, g, g);
         rotate3(frame, g + 3, g + 3);

@@ -8,6 +8,7 @@
 #include <string.h>
 
 static const int both_move[2] = {1, 1};
+static const int all_hold = HOLD_ANY | HOLD_P | HOLD_S;
 
 static void straight_derivatives(const scene *c, double *length, double *g) {
     double d[3] = {c->ends[3] - c->ends[0], c->ends[4] - c->ends[1], c->ends[5] - c->ends[2]};
@@ -27,12 +28,13 @@ static int fading(const scene *c, double *length, double *g, double *h) {
         straight_derivatives(c, length, g);
         return 0;
     }
-    if (!wrap_fades(&c->surface, c->ends, c->ends + 3, both_move, &string)) {
+    if (!wrap_fades(&c->surface, c->ends, c->ends + 3, both_move, all_hold, &string)) {
         *length = wrap_length(&string);
         gradient(&string, g);
         return 0;
     }
-    *length = wrap_faded(&c->surface, c->ends, c->ends + 3, both_move, &string, g, pp, ps, ss);
+    *length =
+        wrap_faded(&c->surface, c->ends, c->ends + 3, both_move, all_hold, &string, g, pp, ps, ss);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
             h[6 * i + j] = pp[3 * i + j];
@@ -252,12 +254,64 @@ static void slipping_over_has_its_own_derivatives(void **state) {
     assert_own_derivatives(&all, 40, "slip");
 }
 
+/* Where the string goes on or off while the straight line is free, nothing but the side has held
+ * it: on the way there it fades. */
+static void what_the_side_holds_goes_without_a_jump(void **state) {
+    (void)state;
+    uint64_t seed = 59;
+    tally all = {0};
+    int changes = 0;
+    double most = 0;
+    for (int trial = 0; trial < 20000 && (all.met < 60 || changes < 60); trial++) {
+        scene c = random_scene(MHE_OBSTACLE_CYLINDER, &seed), other;
+        scene two[2] = {c, random_scene(MHE_OBSTACLE_CYLINDER, &seed)};
+        wrap_string string;
+        double length, y[6], h[36];
+        for (int e = 0; e < 2; e++) {
+            two[e].surface = c.surface;
+            two[e].surface.side_axis = trial % 2;
+            two[e].surface.side_sign = trial % 4 < 2 ? 1 : -1;
+            memcpy(two[e].ends, c.ends, 3 * sizeof c.ends[0]);
+        }
+        c = two[0];
+        if (all.met < 60 && solve(&c, &string) == WRAP_POSSIBLE && fading(&c, &length, y, h) &&
+            string.other == 0 && wrap_outside(&c.surface, c.ends) > 0.02 &&
+            wrap_outside(&c.surface, c.ends + 3) > 0.02) {
+            count(&all, &c, y, h, wrap_length(&string) - length);
+        }
+        int on[2] = {solve(&two[0], &string), solve(&two[1], &string)};
+        if (on[0] == WRAP_INSIDE || on[1] == WRAP_INSIDE || (on[0] > 0) == (on[1] > 0)) {
+            continue;
+        }
+        for (int k = 0; k < 60; k++) { /* to where it changes */
+            other = two[0];
+            for (int i = 3; i < 6; i++) {
+                other.ends[i] = 0.5 * (two[0].ends[i] + two[1].ends[i]);
+            }
+            int now = solve(&other, &string);
+            two[(now > 0) == (on[1] > 0)] = other;
+        }
+        on[0] = solve(&two[0], &string);
+        on[1] = solve(&two[1], &string);
+        if (on[0] == WRAP_POSSIBLE || on[1] == WRAP_POSSIBLE) {
+            (void)solve(&two[on[1] == WRAP_POSSIBLE], &string);
+            most = fmax(most, wrap_length(&string));
+            changes++;
+            assert_near(fading_length(&two[0]), fading_length(&two[1]), 1e-9);
+        }
+    }
+    print_message("%d go on or off, with strings of up to %.0f mm\n", changes, 1e3 * most);
+    assert_true(changes >= 60);
+    assert_own_derivatives(&all, 60, "held by the side");
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(letting_go_is_no_jump),
         cmocka_unit_test(slipping_off_is_no_jump),
         cmocka_unit_test(turning_about_is_no_jump),
         cmocka_unit_test(slipping_over_has_its_own_derivatives),
+        cmocka_unit_test(what_the_side_holds_goes_without_a_jump),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -3,6 +3,7 @@
 #include "fade.h"
 
 #include "../vector.h"
+#include "hold.h"
 
 #include <math.h>
 #include <string.h>
@@ -122,8 +123,11 @@ int wrap_is_off(const wrap_surface *surface, const wrap_string *string) {
 }
 
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
-               const wrap_string *string) {
+               int holds, const wrap_string *string) {
     double excess = wrap_length(string) - distance_of(p, s), off[2];
+    if (hold_fades(surface, p, s, holds, excess)) {
+        return 1;
+    }
     if (string->held || string->other > 0) {
         return 1;
     }
@@ -288,7 +292,8 @@ static void fade_excess(const wrap_surface *surface, const double *p, const doub
 }
 
 double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
-                  const wrap_string *string, double *g, double *pp, double *ps, double *ss) {
+                  int holds, const wrap_string *string, double *g, double *pp, double *ps,
+                  double *ss) {
     jet length, straight, excess;
     double most = FADE_INSIDE * (wrap_length(string) - distance_of(p, s));
     straight_jet(p, s, &straight);
@@ -309,6 +314,11 @@ double wrap_faded(const wrap_surface *surface, const double *p, const double *s,
         jet_add(&excess, 1, &other, &excess);
     } else {
         fade_excess(surface, p, s, moves, string, &straight, &excess);
+    }
+    if (hold_fades(surface, p, s, holds, excess.value)) {
+        jet share;
+        hold_jet(surface, p, s, holds, &excess, &share);
+        jet_multiply(&share, &excess, &excess);
     }
     jet_add(&straight, 1, &excess, &length);
     jet_out(&length, g, pp, ps, ss);

@@ -11,6 +11,8 @@
  *     held on the side asked for, where the
  *     string of any side is shorter, by F, and
  *     the pass between both higher, by b:          E - F + F S(b / (l F))
+ *     held by its side alone, by weights
+ *     x, y, z (hold.c):                        E (x y + z (x + y - 2 x y))
  * so that what ends inside fades the faster the less it is; the slope does not exceed 15 / (8 k).
  * Where the way round a cylinder turns about, both excesses fade so and their mean counts (side.h).
  * An end that stays where it is on the obstacle's body never comes in, and fades nothing. The first
@@ -18,6 +20,7 @@
 #ifndef SIMBODY_FADE_H
 #define SIMBODY_FADE_H
 
+#include "hold.h"
 #include "side.h"
 #include "wrap.h"
 
@@ -25,14 +28,16 @@
 #define FADE_OFF 0.25    /* m */
 #define FADE_PASS 0.25   /* l */
 
-/* Whether a string between p and s, in the obstacle's frame, is fading; `moves`: of either end. */
+/* Whether a string between p and s, in the obstacle's frame, is fading; `moves`: of either end;
+ * `holds`: HOLD_*. */
 int wrap_fades(const wrap_surface *surface, const double *p, const double *s, const int *moves,
-               const wrap_string *string);
+               int holds, const wrap_string *string);
 
 /* The length of one that is, with gradient g [6] and second derivatives by p and s; both NULL: not
  * wanted. */
 double wrap_faded(const wrap_surface *surface, const double *p, const double *s, const int *moves,
-                  const wrap_string *string, double *g, double *pp, double *ps, double *ss);
+                  int holds, const wrap_string *string, double *g, double *pp, double *ps,
+                  double *ss);
 
 /* A string's length by its ends. */
 void wrap_jet(const wrap_string *string, jet *out);
