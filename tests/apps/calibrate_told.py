@@ -80,7 +80,7 @@ def test_copies():
         write("copies.yaml", CONFIG.replace("  parameters:", "    - %s\n  parameters:" % line))
         done = run(CALIBRATE, "copies.yaml", "--out", "copies", "--set", "calibrate.max_iterations=1")
         assert done.returncode == 0, done.stderr
-        told = [line for line in done.stderr.split("\n") if "are the same" in line]
+        told = [line for line in done.stderr.split("\n") if "are the same: " in line]
         assert len(told) == 1 and said % os.getcwd() in told[0] and "recordings 2 (" in told[0], done.stderr
 
 
