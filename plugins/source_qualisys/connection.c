@@ -99,6 +99,17 @@ void qualisys_drop(qualisys *s, size_t used) {
     s->n_bytes -= used;
 }
 
+mhe_status qualisys_says(const rt_packet *packet, mhe_status status, mhe_error *err) {
+    char text[200];
+    size_t n = 0;
+    for (; n < packet->length && n + 1 < sizeof text && packet->body[n] != '\0'; n++) {
+        const uint8_t c = packet->body[n];
+        text[n] = (char)(c < ' ' || c == 127 ? '?' : c);
+    }
+    text[n] = '\0';
+    return mhe_fail(err, status, "QTM says: %s", text);
+}
+
 /* Waits for a packet of a type; others are passed over. Its body is valid until
  * qualisys_drop(*used). */
 mhe_status qualisys_await(qualisys *s, uint32_t type, double deadline, rt_packet *packet,
@@ -109,8 +120,7 @@ mhe_status qualisys_await(qualisys *s, uint32_t type, double deadline, rt_packet
             return MHE_OK;
         }
         if (status == MHE_OK && packet->type == RT_ERROR) {
-            return mhe_fail(err, MHE_RETRY, "QTM says: %.*s", (int)packet->length,
-                            (const char *)packet->body);
+            return qualisys_says(packet, MHE_RETRY, err);
         }
         if (status == MHE_OK) {
             qualisys_drop(s, *used);

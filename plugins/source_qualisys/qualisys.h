@@ -12,6 +12,7 @@
 #define AGAIN 0.5          /* s between two tries to connect anew */
 #define ANSWER 2.0         /* s that an answer may take */
 #define ASK_EVERY 1.0      /* s between two questions what data that differ are */
+#define SILENCE 2.0        /* s without 3D data, which are told */
 
 struct qualisys_config { /* filled by the core from the option table */
     const char *host;
@@ -37,6 +38,8 @@ typedef struct qualisys {
     int32_t lost;
     int32_t differs;      /* data have other markers or channels than were described */
     double asked;         /* s, when that was asked about last */
+    int32_t unlike;       /* that they differ from what is described for good was told */
+    double heard;         /* s, of the last 3D data, or the stream's beginning */
     uint32_t next_sample; /* number that the next analog sample should have */
 } qualisys;
 
@@ -51,7 +54,14 @@ void qualisys_drop(qualisys *s, size_t used);
 /* Waits for a packet of a type; others are passed over. Its body is valid until it is dropped. */
 mhe_status qualisys_await(qualisys *s, uint32_t type, double deadline, rt_packet *packet,
                           size_t *used, mhe_error *err);
+/* What QTM says in a packet of text, in one line. */
+mhe_status qualisys_says(const rt_packet *packet, mhe_status status, mhe_error *err);
 mhe_status qualisys_ask(qualisys *s, const char *command, uint32_t type, rt_packet *packet,
                         size_t *used, mhe_error *err);
+
+/* settings.c. Asks what is streamed; `same`: nothing is described in another way than before.
+ * MHE_RETRY: no markers, not the device. */
+mhe_status qualisys_ask_settings(qualisys *s, int *same, mhe_error *err);
+void qualisys_free_axes(qualisys *s, int32_t n_markers);
 
 #endif

@@ -47,6 +47,13 @@ mhe_status rt_take_packet(const uint8_t *data, size_t length, rt_packet *out, si
     if (!take(&c, 4, &size) || !take(&c, 4, &type)) {
         return mhe_fail(err, MHE_RETRY, "a packet is not whole yet");
     }
+    const uint64_t turned = __builtin_bswap32((uint32_t)size);
+    if (type != 0 && __builtin_bswap32((uint32_t)type) <= 16 && turned >= RT_HEADER &&
+        turned <= RT_LARGEST) {
+        return mhe_fail(err, MHE_E_INPUT,
+                        "QTM answers in the other byte order: its little-endian port is one below "
+                        "(22223 of 22224)");
+    }
     if (size < RT_HEADER || size > RT_LARGEST || type > 16) {
         return mhe_fail(err, MHE_E_INPUT,
                         "a packet of %llu bytes and type %llu: this is no real-time server of QTM",

@@ -7,76 +7,26 @@
 #include <string.h>
 #include <time.h>
 
-/* ---- what is streamed ---- */
-
-static void free_axes(qualisys *s, int32_t n_markers) {
-    for (int32_t i = 0; i < 3 * n_markers && s->labels != NULL; i++) {
-        free(s->labels[i]);
-    }
-    free(s->labels);
-    free(s->units);
-    s->labels = s->units = NULL;
-}
-
-static mhe_status name_axes(qualisys *s, mhe_error *err) {
-    static char metre[] = "m";
-    const int32_t n = s->parameters.n_markers;
-    s->labels = calloc((size_t)(3 * n) + 1, sizeof *s->labels);
-    s->units = calloc((size_t)(3 * n) + 1, sizeof *s->units);
-    for (int32_t i = 0; i < 3 * n && s->labels != NULL && s->units != NULL; i++) {
-        const char *name = s->parameters.markers[i / 3];
-        s->units[i] = metre; /* the protocol's mm are converted */
-        s->labels[i] = malloc(strlen(name) + 3);
-        if (s->labels[i] == NULL) {
-            return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-        }
-        (void)sprintf(s->labels[i], "%s.%c", name, "xyz"[i % 3]);
-    }
-    return s->labels == NULL || s->units == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                                                 : MHE_OK;
-}
-
-static mhe_status choose_device(qualisys *s, mhe_error *err) {
-    const rt_parameters *p = &s->parameters;
-    s->device = -1;
-    for (int32_t i = 0; i < p->n_devices && s->config.emg && s->device < 0; i++) {
-        const int named = s->config.device[0] != '\0';
-        s->device = !named || strcmp(p->devices[i].name, s->config.device) == 0 ? i : -1;
-    }
-    if (s->config.emg && s->device < 0) {
-        return mhe_fail(err, MHE_RETRY, "QTM streams no analog device%s%s%s",
-                        s->config.device[0] == '\0' ? "" : " '", s->config.device,
-                        s->config.device[0] == '\0' ? "" : "'");
-    }
-    return MHE_OK;
-}
-
-static mhe_status read_parameters(qualisys *s, mhe_error *err) {
+/* "Version set to 1.22"; or that it is not supported. */
+static mhe_status set_version(qualisys *s, mhe_error *err) {
     rt_packet packet;
     size_t used = 0;
-    rt_parameters fresh;
-    mhe_status status =
-        qualisys_ask(s, s->config.emg ? "GetParameters 3D Analog" : "GetParameters 3D", RT_XML,
-                     &packet, &used, err);
-    if (status != MHE_OK) {
-        return status;
+    mhe_status status = qualisys_ask(s, "Version 1.22", RT_COMMAND, &packet, &used, err);
+    if (status == MHE_OK) {
+        static const char good[] = "Version set to";
+        status = packet.length >= sizeof good - 1 && memcmp(packet.body, good, sizeof good - 1) == 0
+                     ? MHE_OK
+                     : qualisys_says(&packet, MHE_RETRY, err);
+        qualisys_drop(s, used);
     }
-    status = rt_parse_parameters((const char *)packet.body, packet.length, &fresh, err);
-    qualisys_drop(s, used);
-    if (status != MHE_OK) {
-        return status;
-    }
-    free_axes(s, s->parameters.n_markers);
-    rt_free_parameters(&s->parameters);
-    s->parameters = fresh;
-    status = name_axes(s, err);
-    return status == MHE_OK ? choose_device(s, err) : status;
+    return status;
 }
 
 /* The whole greeting up to a running stream. */
 static mhe_status begin(qualisys *s, double deadline, mhe_error *err) {
     rt_packet packet;
     size_t used = 0;
+    int same = 0;
     mhe_status status = qualisys_connect(s, deadline, err);
     if (status == MHE_OK) {
         status = qualisys_await(s, RT_COMMAND, qualisys_now() + ANSWER, &packet, &used,
@@ -84,17 +34,18 @@ static mhe_status begin(qualisys *s, double deadline, mhe_error *err) {
     }
     if (status == MHE_OK) {
         qualisys_drop(s, used);
-        status = qualisys_ask(s, "Version 1.22", RT_COMMAND, &packet, &used, err);
+        status = set_version(s, err);
     }
     if (status == MHE_OK) {
-        qualisys_drop(s, used);
-        status = read_parameters(s, err);
+        status = qualisys_ask_settings(s, &same, err);
     }
     if (status == MHE_OK) {
         status = qualisys_send(
             s, s->config.emg ? "StreamFrames AllFrames 3D Analog" : "StreamFrames AllFrames 3D",
             err);
     }
+    s->heard = qualisys_now();
+    s->unlike = s->differs = 0;
     if (status != MHE_OK) {
         qualisys_disconnect(s);
     }
@@ -109,7 +60,7 @@ static void qualisys_destroy(void *self) {
         (void)qualisys_send(s, "StreamFrames Stop", NULL);
     }
     qualisys_disconnect(s);
-    free_axes(s, s->parameters.n_markers);
+    qualisys_free_axes(s, s->parameters.n_markers);
     rt_free_parameters(&s->parameters);
     free(s->bytes);
     free(s->numbers);
@@ -174,6 +125,11 @@ static void tell(const qualisys *s, int32_t event, int32_t stream, const char *t
 
 static void take_markers(void *data, double time, int32_t n, const double *position) {
     qualisys *s = data;
+    s->heard = qualisys_now();
+    if (s->lost) {
+        s->lost = 0;
+        tell(s, MHE_SOURCE_BACK, -1, "QTM streams again");
+    }
     if (n != s->parameters.n_markers) {
         s->differs = 1; /* often an event says so first */
         return;
@@ -219,11 +175,19 @@ static void take_analog(void *data, double time, int32_t device, int32_t n_chann
     s->taker->chunk(s->taker->data, &chunk);
 }
 
-/* Settings have changed while it streams: what is described is asked for anew. */
-static mhe_status settings_changed(qualisys *s, mhe_error *err) {
-    const mhe_status status = read_parameters(s, err);
-    if (status == MHE_OK) {
+/* Settings have changed while it streams, as an event says or the data show: what is described is
+ * asked for anew. */
+static mhe_status settings_changed(qualisys *s, int by_data, mhe_error *err) {
+    int same = 0;
+    const mhe_status status = qualisys_ask_settings(s, &same, err);
+    if (status == MHE_OK && !same) {
+        s->unlike = 0;
         tell(s, MHE_SOURCE_CHANGED, -1, "QTM streams other markers or channels now");
+    } else if (status == MHE_OK && by_data && !s->unlike) {
+        s->unlike = 1;
+        tell(s, MHE_SOURCE_WARNING, -1,
+             "QTM's data have other numbers of markers or channels than its settings say: they are "
+             "passed over");
     }
     return status;
 }
@@ -233,20 +197,25 @@ static mhe_status take_packet(qualisys *s, const rt_packet *packet, size_t used,
     mhe_status status = MHE_OK;
     const uint32_t type = packet->type;
     const int event = type == RT_EVENT && packet->length > 0 ? packet->body[0] : -1;
+    mhe_error why = {0};
+    if (type == RT_ERROR) {
+        (void)qualisys_says(packet, MHE_E_INPUT, &why);
+        tell(s, MHE_SOURCE_WARNING, -1, why.text);
+    }
     if (type == RT_DATA) {
-        mhe_error why = {0};
         if (rt_parse_data(packet, s->numbers, NUMBERS, &taker, &why) != MHE_OK) {
             tell(s, MHE_SOURCE_WARNING, -1, why.text);
         }
     }
     qualisys_drop(s, used);
     if (type == RT_NO_MORE_DATA) {
-        tell(s, MHE_SOURCE_LOST, -1, "QTM has no more data: the measurement has ended");
         s->lost = 1;
+        tell(s, MHE_SOURCE_LOST, -1, "QTM has no more data: the measurement has ended");
     } else if (event == RT_EVENT_CHANGED || (s->differs && qualisys_now() - s->asked > ASK_EVERY)) {
+        const int by_data = event != RT_EVENT_CHANGED;
         s->asked = qualisys_now();
         s->differs = 0;
-        status = settings_changed(s, err);
+        status = settings_changed(s, by_data, err);
     } else if (event == RT_EVENT_CLOSED) {
         status = mhe_fail(err, MHE_RETRY, "QTM is shutting down");
     }
@@ -259,10 +228,6 @@ static mhe_status take_all(qualisys *s, mhe_error *err) {
     mhe_status status = MHE_OK;
     while (status == MHE_OK &&
            (status = rt_take_packet(s->bytes, s->n_bytes, &packet, &used, err)) == MHE_OK) {
-        if (s->lost && packet.type == RT_DATA) {
-            s->lost = 0;
-            tell(s, MHE_SOURCE_BACK, -1, "QTM streams again");
-        }
         status = take_packet(s, &packet, used, err);
         if (status == MHE_RETRY) {
             return status;
@@ -300,6 +265,12 @@ static mhe_status qualisys_read(void *self, double deadline, const mhe_source_ta
     mhe_status status = qualisys_receive(s, deadline, &why);
     if (status == MHE_OK) {
         status = take_all(s, &why);
+    }
+    if (status == MHE_OK && !s->lost && qualisys_now() - s->heard > SILENCE) {
+        s->lost = 1;
+        tell(s, MHE_SOURCE_LOST, -1,
+             s->n_bytes > 0 ? "QTM has stopped in the middle of a packet"
+                            : "QTM sends no 3D data for two seconds");
     }
     if (status == MHE_E_MEMORY) {
         return mhe_fail(err, status, "%s", why.text);

@@ -56,6 +56,11 @@ expect no-arguments 'config file' --set a=b
 expect unknown-option "did you mean '--quiet'" demo.yaml --quit
 expect folder-as-config 'models' "$2/models"
 
+edit demo.yaml 's/demo_markers/demo_marker/'
+expect absent-markers "demo.yaml:6: $work/demo_marker.trc: cannot be opened: No such file or directory (did you mean 'demo_markers.trc'?)"
+edit demo.yaml 's/arm19.osim/arm91.osim/'
+expect absent-model "demo.yaml:4: $work/arm91.osim: cannot be opened"
+
 edit demo.yaml 's/^horizon:.*/horizon: {windw: 7}/'
 expect unknown-key "did you mean 'window'"
 edit demo.yaml 's/window: 7/window: seven/'

@@ -14,13 +14,13 @@
 
 #define N 1500 /* more than are kept at first */
 
-static char folder[] = "/tmp/mhe-results-XXXXXX";
+static char folder[256];
 static const char *const coordinates[] = {"elbow", "shoulder, left"};
 static const char *const muscles[] = {"BRA", "BRD", "TRI"};
 static const char *const markers[] = {"DELT"};
 
 static const char *path_of(const char *name) {
-    static char path[96];
+    static char path[512];
     (void)snprintf(path, sizeof path, "%s/%s", folder, name);
     return path;
 }
@@ -224,7 +224,7 @@ static void only_what_was_asked_for(void **state) {
 
 static int set_up(void **state) {
     (void)state;
-    if (mkdtemp(folder) == NULL) {
+    if (test_folder(folder, sizeof folder) == NULL) {
         return -1;
     }
     write_all("[csv, mat]");

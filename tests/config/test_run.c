@@ -2,88 +2,10 @@
 /* test_run.c: whole configurations, read with plugins of the tests' own. */
 #include "config/defaults.h"
 #include "config/options.h"
-#include "config/run.h"
-#include "support.h"
+#include "run_rig.h"
 
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-#define FILE_NAME TEST_FOLDER "/run.yaml"
-/* Enough for a run; the path is relative to the file's folder. */
-#define BASE                                                   \
-    "model: {plugin: org.test.model.a, file: arm.osim}\n"      \
-    "muscle: org.test.muscle.a\n"                              \
-    "integrator: org.test.integrator.a\n"                      \
-    "solver: {plugin: org.test.solver.a, max_iterations: 5}\n" \
-    "plugin_path: plugins\n"
-#define COSTS "costs: [org.test.cost.b]\n"
-
-static void ignore_log(const mhe_host *host, int32_t level, const char *text) {
-    (void)host, (void)level, (void)text;
-}
-
-static const void *no_service(const mhe_host *host, const char *id) {
-    (void)host, (void)id;
-    return NULL;
-}
-
-static const mhe_host host = {.size = sizeof host, .log = ignore_log, .service = no_service};
-
-static void write_file(const char *path, const char *text) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    assert_int_equal(fputs(text, file) >= 0, 1);
-    assert_int_equal(fclose(file), 0);
-}
-
-struct outcome {
-    mhi_registry *registry;
-    mhi_run *run;
-    mhe_status status;
-    mhe_error err;
-};
-
-static struct outcome read_path(const char *path, const char *const *set, int32_t n_set) {
-    struct outcome o = {0};
-    assert_int_equal(mhi_registry_create(&host, &o.registry, &o.err), MHE_OK);
-    mhi_registry_trust_files(o.registry, 1);
-    o.status = mhi_run_read(path, set, n_set, o.registry, &o.run, &o.err);
-    assert_int_equal(o.run == NULL, o.status != MHE_OK);
-    return o;
-}
-
-static void release(struct outcome *o) {
-    mhi_run_free(o->run);
-    mhi_registry_free(o->registry);
-}
-
-static struct outcome read_good(const char *yaml, const char *const *set, int32_t n_set) {
-    write_file(FILE_NAME, yaml);
-    struct outcome o = read_path(FILE_NAME, set, n_set);
-    assert_string_equal(o.err.text, "");
-    assert_int_equal(o.status, MHE_OK);
-    return o;
-}
-
-/* `message` stands behind the file name. */
-static void assert_refused_set(const char *yaml, const char *set, mhe_status code,
-                               const char *message) {
-    write_file(FILE_NAME, yaml);
-    struct outcome o = read_path(FILE_NAME, &set, set != NULL);
-    assert_int_equal(o.status, code);
-    const char *text = o.err.text;
-    if (strncmp(text, FILE_NAME, strlen(FILE_NAME)) == 0) {
-        text += strlen(FILE_NAME);
-    }
-    assert_string_equal(text, message);
-    release(&o);
-}
-
-static void assert_refused(const char *yaml, const char *message) {
-    assert_refused_set(yaml, NULL, MHE_E_CONFIG, message);
-}
 
 static void defaults_of_the_core(void **state) {
     (void)state;
@@ -153,50 +75,6 @@ static void electrodes_of_the_file(void **state) {
     release(&o);
 }
 
-static void bad_electrodes_and_formats(void **state) {
-    (void)state;
-    assert_refused(BASE COSTS "emg: {low_pass: 4}\n",
-                   ":7: emg: 'channels' is missing, the list of electrodes: [{name: COLUMN, "
-                   "muscles: [MUSCLE, ...], mvc: NUMBER}, ...]");
-    assert_refused(BASE COSTS "emg: {lowpass: 4, channels: []}\n",
-                   ":7: emg: unknown key 'lowpass' (did you mean 'low_pass'?)");
-    assert_refused(BASE COSTS "emg: {channels: {a: b}}\n",
-                   ":7: emg.channels: must be a list: [{name: COLUMN, muscles: [MUSCLE, ...]}, "
-                   "...]");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n    - {name: a}\n",
-                   ":10: emg.channels: the key 'muscles' is missing: Muscles it stands for, "
-                   "or patterns: glmax*_r.");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
-                              "    - {name: a, muscles: [x, y], gains: [1]}\n",
-                   ":10: emg.channels: channel 'a' has 1 gains for 2 muscles");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
-                              "    - {name: a, muscles: []}\n",
-                   ":10: emg.channels: channel 'a' names no muscle");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
-                              "    - {name: a, muscles: x}\n    - {name: a, muscles: y}\n",
-                   ":11: emg.channels: channel 'a' is there twice; one entry lists all of its "
-                   "muscles");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\nemg:\n  channels:\n"
-                              "    - {name: a, muscles: x, delay: -0.02}\n",
-                   ":10: emg.channels: channel 'a': 'delay' is -0.02 s; EMG comes before the "
-                   "activation, so at least 0 (or -1: that of the section)");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\n"
-                              "emg: {delay: -0.5, channels: [{name: a, muscles: x}]}\n",
-                   ":8: emg: 'delay' is -0.5 s; EMG comes before the activation, so at least 0 (or "
-                   "-1: what is usual)");
-    assert_refused(BASE COSTS "emg:\n  channels:\n    - {name: a, muscles: x}\n",
-                   ":7: emg: there are channels, but data.emg names no file");
-    assert_refused(BASE COSTS "data: {emg: e.sto}\n"
-                              "emg: {band_low: 500, channels: [{name: a, muscles: x}]}\n",
-                   ":8: emg: 'band_low' is 500 Hz, which is not below 'band_high', 450 Hz");
-    assert_refused(BASE COSTS "output: {formats: [mat, cvs]}\n",
-                   ":7: output: 'formats' cannot hold 'cvs' (did you mean 'csv'?)");
-    struct outcome o = read_good(BASE COSTS "emg:\noutput: {formats: mat}\n", NULL, 0);
-    assert_int_equal(o.run->output.formats.n, 1);
-    assert_int_equal(o.run->emg.n_channels, 0);
-    release(&o);
-}
-
 static void values_of_the_file(void **state) {
     (void)state;
     struct outcome o = read_good(
@@ -250,94 +128,13 @@ static void assignments(void **state) {
                        "has no place");
 }
 
-static void wrong_sections(void **state) {
-    (void)state;
-    assert_refused(BASE COSTS "sollver: {}\n",
-                   ":7: unknown key 'sollver' (did you mean 'solver'?)");
-    assert_refused(BASE COSTS "formulation: excitations\n",
-                   ":7: 'formulation' cannot be 'excitations' (did you mean 'excitation'?)");
-    assert_refused(BASE COSTS "horizon: 7\n",
-                   ":7: horizon: must be a mapping like {key: value}, not a single value");
-    assert_refused(BASE COSTS "horizon:\n  window: 7\n  ratio: 0\n",
-                   ":9: horizon: 'ratio' must be at least 1, not '0'");
-    assert_refused(BASE COSTS "initial: {q: 0.1}\n",
-                   ":7: initial: 'q' must be a list of numbers (rad or m), not '0.1'; put it in "
-                   "brackets");
-    assert_refused(BASE COSTS "initial: {q: [1, 2], qdot: [0]}\n",
-                   ":7: initial: 'q' has 2 values and 'qdot' 1");
-    assert_refused(BASE COSTS "bounds: {activation_min: 0.5, activation_max: 0.4}\n",
-                   ":7: bounds: 'activation_min' is above 'activation_max'");
-    assert_refused(BASE COSTS "bounds: {excitation_min: 0.5, excitation_max: 0.4}\n",
-                   ":7: bounds: 'excitation_min' is above 'excitation_max'");
-    assert_refused(BASE, ": costs: a list with at least one entry is needed, like [{plugin: "
-                         "ID}]");
-    assert_refused(BASE "costs: []\n", ":6: costs: a list with at least one entry is needed, like "
-                                       "[{plugin: ID}]");
-    assert_refused(BASE "costs: org.test.cost.b\n",
-                   ":6: costs: a list with at least one entry is needed, like [{plugin: "
-                   "ID}]");
-    assert_refused("- a\n", ":1: a configuration is a mapping of sections (model, costs, ...)");
-    assert_refused("{plugin_path: plugins, model: org.test.model.a}\n",
-                   ":1: model: the key 'file' is missing: Model file, .osim or .bioMod.");
-}
-
-static void wrong_plugin_sections(void **state) {
-    (void)state;
-    assert_refused(BASE "costs:\n  - {weight: 1}\n",
-                   ":7: costs: the id of a plugin is missing: {plugin: ID, ...}");
-    assert_refused(BASE "costs:\n  - plugin: [a]\n",
-                   ":7: costs: the id of a plugin is missing: {plugin: ID, ...}");
-    assert_refused(BASE "costs:\n  - [a]\n",
-                   ":7: costs: must be the id of a plugin or a mapping {plugin: ID, ...}");
-    assert_refused(BASE "costs:\n  - {plugin: org.test.cost.a,\n     wieght: 1}\n",
-                   ":8: org.test.cost.a: unknown key 'wieght' (did you mean 'weight'?)");
-    assert_refused(BASE "costs:\n  - {plugin: org.test.cost.a,\n     marker: 1}\n",
-                   ":8: org.test.cost.a: unknown key 'marker' (did you mean 'markers'?)");
-    assert_refused(BASE "costs:\n  - {plugin: org.test.cost.b, weight: -1}\n",
-                   ":7: costs: 'weight' must be at least 0, not '-1'");
-    assert_refused(BASE "costs:\n  - {plugin: org.test.cost.b, weight: .inf}\n",
-                   ":7: costs: 'weight' must be finite, not '.inf'");
-    assert_refused(BASE "costs:\n  - {plugin: org.test.cost.b, sigma: 0}\n",
-                   ":7: costs: 'sigma' must be at least 1e-12, not '0'");
-    assert_refused_set(BASE "costs:\n  - org.test.cost.greedy\n", NULL, MHE_E_PLUGIN,
-                       ":7: org.test.cost.greedy: the plugin's option 'weight' has the name of a "
-                       "key of every 'costs' section");
-    assert_refused_set(BASE COSTS, "model.unsupported=warm", MHE_E_CONFIG,
-                       "--set: model: 'unsupported' cannot be 'warm' (did you mean 'warn'?)");
-}
-
-static void unknown_plugins(void **state) {
-    (void)state;
-    write_file(FILE_NAME, BASE "costs:\n  - org.test.cost.c\n");
-    struct outcome o = read_path(FILE_NAME, NULL, 0);
-    assert_int_equal(o.status, MHE_E_PLUGIN);
-    assert_non_null(strstr(o.err.text, FILE_NAME ":7: costs: "));
-    assert_non_null(strstr(o.err.text, "org.test.cost.c"));
-    release(&o);
-    write_file(FILE_NAME, BASE "costs:\n  - org.test.solver.a\n"); /* of another kind */
-    o = read_path(FILE_NAME, NULL, 0);
-    assert_int_equal(o.status, MHE_E_PLUGIN);
-    assert_non_null(strstr(o.err.text, FILE_NAME ":7: costs: "));
-    release(&o);
-}
-
-static void absent_plugin_folder(void **state) {
-    (void)state;
-    write_file(FILE_NAME, "# a comment\nplugin_path: [nowhere]\n" COSTS);
-    struct outcome o = read_path(FILE_NAME, NULL, 0);
-    assert_int_not_equal(o.status, MHE_OK);
-    assert_non_null(strstr(o.err.text, FILE_NAME ":2: "));
-    assert_non_null(strstr(o.err.text, TEST_FOLDER "/nowhere"));
-    release(&o);
-}
-
 /* A folder of plugins is code: a file from elsewhere may not name one, its reader may. */
 static void plugin_folders_need_trust(void **state) {
     (void)state;
     struct outcome o = {0};
     const char *own = "plugin_path=[" TEST_FOLDER "/plugins]";
     write_file(FILE_NAME, BASE COSTS);
-    assert_int_equal(mhi_registry_create(&host, &o.registry, &o.err), MHE_OK);
+    assert_int_equal(mhi_registry_create(&run_host, &o.registry, &o.err), MHE_OK);
     o.status = mhi_run_read(FILE_NAME, NULL, 0, o.registry, &o.run, &o.err);
     assert_int_equal(o.status, MHE_E_CONFIG);
     assert_non_null(strstr(o.err.text, FILE_NAME ":5: plugin_path: '" TEST_FOLDER
@@ -350,29 +147,48 @@ static void plugin_folders_need_trust(void **state) {
     release(&o);
 }
 
-static void unreadable_file(void **state) {
-    (void)state;
-    struct outcome o = read_path(TEST_FOLDER "/absent.yaml", NULL, 0);
-    assert_int_equal(o.status, MHE_E_INPUT);
-    assert_string_equal(o.err.text,
-                        TEST_FOLDER "/absent.yaml: cannot be opened: No such file or directory");
-    release(&o);
-}
-
 /* Paths in the file hold from wherever the program was started. */
 static void relative_file_name(void **state) {
     (void)state;
     write_file(FILE_NAME, BASE COSTS);
     assert_int_equal(chdir(TEST_FOLDER), 0);
-    struct outcome o = read_path("run.yaml", NULL, 0);
+    struct outcome o = read_path(TEST_RUN ".yaml", NULL, 0);
     assert_string_equal(o.err.text, "");
     assert_string_equal(o.run->dir, TEST_FOLDER);
-    assert_string_equal(o.run->path, "run.yaml");
+    assert_string_equal(o.run->path, TEST_RUN ".yaml");
     release(&o);
-    o = read_path("plugins/../run.yaml", NULL, 0);
+    o = read_path("plugins/../" TEST_RUN ".yaml", NULL, 0);
     assert_string_equal(o.err.text, "");
     assert_string_equal(o.run->dir, TEST_FOLDER "/plugins/..");
     assert_string_equal(o.run->name, "run");
+    release(&o);
+}
+
+/* A file that is not there is told with the line that names it. */
+static void the_line_that_names_a_file(void **state) {
+    (void)state;
+    static const struct {
+        const char *said, *expected;
+    } cases[] = {
+        {TEST_FOLDER "/m.trc: cannot be opened: No", FILE_NAME ":7: " TEST_FOLDER "/m.trc"},
+        {"/abs/e.sto: is a folder", FILE_NAME ":8: /abs/e.sto: is a folder"},
+        {TEST_FOLDER "/t/../l.xml: cannot be opened: No", FILE_NAME ":9: "},
+        {TEST_FOLDER "/arm.osim: cannot be opened: No", "--set: " TEST_FOLDER "/arm.osim"},
+        {"/abs/e.st: cannot be opened: No", "/abs/e.st: "},
+        {"/abs/e.sto:7: no number", "/abs/e.sto:7: "},
+    };
+    const char *set = "model.file=arm.osim";
+    struct outcome o = read_good(BASE "data:\n  markers: ./m.trc\n  emg: /abs/e.sto\n"
+                                      "  reference: t/../l.xml\n" COSTS,
+                                 &set, 1);
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        mhe_error err = {0};
+        (void)mhe_fail(&err, MHE_E_INPUT, "%s", cases[i].said);
+        assert_int_equal(mhi_run_locate_file(o.run, MHE_E_INPUT, &err), MHE_E_INPUT);
+        if (strncmp(err.text, cases[i].expected, strlen(cases[i].expected)) != 0) {
+            fail_msg("'%s' does not begin with '%s'", err.text, cases[i].expected);
+        }
+    }
     release(&o);
 }
 
@@ -436,20 +252,11 @@ static void tables_are_documented(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(electrodes_of_the_file),
-        cmocka_unit_test(bad_electrodes_and_formats),
-        cmocka_unit_test(defaults_of_the_core),
-        cmocka_unit_test(values_of_the_file),
-        cmocka_unit_test(assignments),
-        cmocka_unit_test(wrong_sections),
-        cmocka_unit_test(wrong_plugin_sections),
-        cmocka_unit_test(unknown_plugins),
-        cmocka_unit_test(plugin_folders_need_trust),
-        cmocka_unit_test(unreadable_file),
-        cmocka_unit_test(absent_plugin_folder),
-        cmocka_unit_test(relative_file_name),
-        cmocka_unit_test(resolved_run_reads_back),
-        cmocka_unit_test(tables_are_documented),
+        cmocka_unit_test(electrodes_of_the_file),    cmocka_unit_test(defaults_of_the_core),
+        cmocka_unit_test(values_of_the_file),        cmocka_unit_test(assignments),
+        cmocka_unit_test(plugin_folders_need_trust), cmocka_unit_test(relative_file_name),
+        cmocka_unit_test(the_line_that_names_a_file),
+        cmocka_unit_test(resolved_run_reads_back),   cmocka_unit_test(tables_are_documented),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

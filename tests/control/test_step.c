@@ -5,6 +5,7 @@
 #include "io/table.h"
 #include "support.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,7 +51,7 @@
     "      - {" TRACK ", signal: activation, value: [0], weight: 1e2}\n"
 
 typedef struct problem {
-    char path[64];
+    char path[300];
     mhe_host host;
     mhi_registry *registry;
     mhi_run *run;
@@ -73,9 +74,11 @@ static const void *no_service(const mhe_host *host, const char *id) {
 }
 
 static mhe_status open_problem(problem *p, const char *yaml) {
-    *p = (problem){.path = "/tmp/mhe-step-XXXXXX",
-                   .host = {.size = sizeof p->host, .log = say_nothing, .service = no_service}};
-    const int file = mkstemp(p->path);
+    char folder[256];
+    *p = (problem){.host = {.size = sizeof p->host, .log = say_nothing, .service = no_service}};
+    assert_non_null(test_folder(folder, sizeof folder));
+    (void)snprintf(p->path, sizeof p->path, "%s/steps.yaml", folder);
+    const int file = open(p->path, O_WRONLY | O_CREAT, 0600);
     assert_true(file >= 0);
     assert_int_equal(write(file, yaml, strlen(yaml)), strlen(yaml));
     assert_int_equal(close(file), 0);
@@ -107,7 +110,6 @@ static void close_problem(problem *p) {
     mhi_run_free(p->run);
     mhi_registry_free(p->registry);
     mhi_arena_free(&p->arena);
-    (void)unlink(p->path);
 }
 
 static void check_reach(const mhi_trajectory *t) {

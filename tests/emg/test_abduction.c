@@ -47,8 +47,8 @@ static double mean_of(const mhi_recording *r, const mhe_description *d, const ch
 static void emg_follows_the_arm(void **state) {
     (void)state;
     static const mhe_host host = {.size = sizeof host, .log = listen, .service = no_service};
-    char folder[] = "/tmp/mhe-abduction-XXXXXX", command[1500], config[64], link[64];
-    assert_non_null(mkdtemp(folder));
+    char folder[256], command[1500], config[300], link[300];
+    assert_non_null(test_folder(folder, sizeof folder));
     (void)snprintf(link, sizeof link, "%s/abduction", folder);
     (void)snprintf(config, sizeof config, "%s/abduction.yaml", folder);
     assert_int_equal(symlink(data, link), 0);

@@ -6,6 +6,7 @@
 #include "near.h"
 #include "rig.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -146,7 +147,7 @@ static void missing_rows_are_a_gap(void **state) {
 static void an_mvc_file_gives_the_scale(void **state) {
     (void)state;
     static const char row[] = "endheader\ntime\tB\tA\n0\t0.25\t0.002\n";
-    char path[] = "/tmp/mhe-mvc-XXXXXX";
+    char folder[256], path[300];
     emg_rig rig;
     double given[3 * FRAMES], found[3 * FRAMES];
     rig_open(&rig);
@@ -154,7 +155,9 @@ static void an_mvc_file_gives_the_scale(void **state) {
     rig.run.emg.channels[0].mvc = 0.002;
     rig.run.emg.channels[1].mvc = 0.5;
     assert_int_equal(rig_read(&rig, table, FRAMES, given), MHE_OK);
-    const int file = mkstemp(path);
+    assert_non_null(test_folder(folder, sizeof folder));
+    (void)snprintf(path, sizeof path, "%s/mvc.sto", folder);
+    const int file = open(path, O_RDWR | O_CREAT, 0600);
     assert_true(file >= 0 && write(file, row, sizeof row - 1) == sizeof row - 1);
     rig.run.emg.channels[0].mvc = 0;
     rig.run.emg.mvc_file = path;
@@ -178,6 +181,12 @@ static void an_mvc_file_gives_the_scale(void **state) {
         most = fmax(most, found[3 * k]);
     }
     assert_near(most, 0.5, 1e-3); /* the crest falls between frames */
+    /* where no channel needs it, it is not looked at, and that is told */
+    assert_null(strstr(rig.told, "mvc_file"));
+    rig.run.emg.channels[0].mvc = 0.002;
+    rig.run.emg.mvc_file = "/no/such.sto";
+    assert_int_equal(rig_read(&rig, table, FRAMES, found), MHE_OK);
+    assert_non_null(strstr(rig.told, "emg.mvc_file: /no/such.sto is not looked at"));
     (void)unlink(path);
     mhi_table_free(table);
     rig_close(&rig);

@@ -104,12 +104,12 @@ static void gaps_are_bridged(void **state) {
     assert_true(force < 10);
 }
 
-/* The reference's angles as another program writes them: in degrees, said by the header. */
-/* In degrees under plain names, or in radians as OpenSim's states are called. */
-static void write_angles(char *path, int32_t degrees) {
+/* The reference's angles as another program writes them: in degrees under plain names,
+ * said by the header, or in radians as OpenSim's states are called. */
+static void write_angles(const char *path, int32_t degrees) {
     mhi_table *t = NULL;
     assert_int_equal(mhi_sto_read(MODELS "demo_reference.sto", &t, NULL), MHE_OK);
-    FILE *file = fdopen(mkstemps(path, 4), "w");
+    FILE *file = fopen(path, "w");
     assert_non_null(file);
     (void)fprintf(file, "angles\nversion=3\ninDegrees=%s\nendheader\ntime", degrees ? "yes" : "no");
     for (int32_t i = 0; i < N_Q; i++) {
@@ -129,13 +129,14 @@ static void write_angles(char *path, int32_t degrees) {
 
 static void expect_the_same(int32_t degrees) {
     static motion by_degrees;
-    char path[] = "/tmp/mhe-degrees-XXXXXX.sto", config[2048];
+    char folder[256], path[300], config[2048];
     double q = 0, force = 0;
+    assert_non_null(test_folder(folder, sizeof folder));
+    (void)snprintf(path, sizeof path, "%s/angles.sto", folder);
     write_angles(path, degrees);
     (void)snprintf(config, sizeof config,
                    HEAD "data: {angles: %s, emg: " MODELS "demo_emg.sto}\n" ANGLE_COSTS, path);
     estimate(config, no_gap, &by_degrees);
-    (void)unlink(path);
     compare(&angles, &by_degrees, &q, &force);
     print_message("in degrees and in radians: %.1e rad, %.1e N apart\n", q, force);
     assert_true(q < 1e-7); /* the reference has 12 digits */

@@ -15,7 +15,7 @@
 
 #define ARM MHE_TEST_SOURCE_DIR "/models/arm19/"
 
-static char folder[] = "/tmp/mhe-motion-XXXXXX", told[2048];
+static char folder[256], told[2048];
 static mhi_table *markers, *emg; /* of the demo */
 static mhe_description *model;
 
@@ -75,7 +75,7 @@ static mhe_status read_data(const char *marker_file, const char *emg_file, mhi_r
 
 static void c3d_is_like_trc_and_sto(void **state) {
     (void)state;
-    char path[64];
+    char path[300];
     test_c3d c = demo();
     mhi_recording *text = NULL, *binary = NULL;
     mhe_error err = {0};
@@ -111,7 +111,7 @@ static void c3d_is_like_trc_and_sto(void **state) {
 static void a_wrong_unit_is_noticed(void **state) {
     (void)state;
     static const char *const units[] = {"mm", "cm", "m"};
-    char path[64];
+    char path[300];
     mhi_recording *right = NULL;
     mhe_error err = {0};
     (void)snprintf(path, sizeof path, "%s/demo.c3d", folder);
@@ -141,7 +141,7 @@ static void a_wrong_unit_is_noticed(void **state) {
 
 static void labels_with_a_subject_and_extra_markers(void **state) {
     (void)state;
-    char path[64], with[8][40];
+    char path[300], with[8][40];
     const char *names[8];
     test_c3d c = demo();
     mhi_recording *r = NULL;
@@ -164,7 +164,7 @@ static void labels_with_a_subject_and_extra_markers(void **state) {
 
 static void frames_that_are_too_few(void **state) {
     (void)state;
-    char path[64];
+    char path[300];
     test_c3d c = demo();
     mhi_recording *r = NULL;
     mhe_error err = {0};
@@ -179,7 +179,7 @@ static void frames_that_are_too_few(void **state) {
 static int set_up(void **state) {
     (void)state;
     mhe_error err = {0};
-    return mkdtemp(folder) == NULL ||
+    return test_folder(folder, sizeof folder) == NULL ||
            mhi_markers_read(ARM "demo_markers.trc", &markers, &err) != MHE_OK ||
            mhi_signals_read(ARM "demo_emg.sto", &emg, &err) != MHE_OK ||
            mhi_model_read(ARM "arm19.osim", &model, &err) != MHE_OK;

@@ -7,6 +7,7 @@
 #include "io/ik_tasks.h"
 #include "support.h"
 
+#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,8 +47,10 @@ static void tasks_are_read(void **state) {
 
 /* A file of `text` is refused with `why`. */
 static void expect_refused(const char *text, const char *why) {
-    char path[] = "/tmp/mhe-tasks-XXXXXX";
-    const int file = mkstemp(path);
+    char folder[256], path[300];
+    assert_non_null(test_folder(folder, sizeof folder));
+    (void)snprintf(path, sizeof path, "%s/tasks.xml", folder);
+    const int file = open(path, O_WRONLY | O_CREAT, 0600);
     mhi_arena arena = {0};
     mhi_ik_task *tasks = NULL;
     int32_t n = 0;

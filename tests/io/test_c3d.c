@@ -372,10 +372,10 @@ static void wrong_files_are_refused(void **state) {
 
 static void files_by_their_ending(void **state) {
     (void)state;
-    char folder[] = "/tmp/mhe-c3d-XXXXXX", path[64];
+    char folder[256], path[300];
     mhi_table *table = NULL;
     mhe_error err = {0};
-    assert_non_null(mkdtemp(folder));
+    assert_non_null(test_folder(folder, sizeof folder));
     (void)snprintf(path, sizeof path, "%s/Walk.C3D", folder);
     test_c3d c = usual();
     assert_int_equal(test_c3d_write(&c, path), 0);

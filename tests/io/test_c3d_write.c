@@ -12,7 +12,7 @@
 #define FRAMES 7
 #define PER_FRAME 4
 
-static char folder[] = "/tmp/mhe-test-c3d-XXXXXX";
+static char folder[256];
 static const char *const markers[] = {"STER", "a longer label than sixteen", "C7"};
 static const char *const channels[] = {"Delt", "Biceps.EMG"};
 static double points[FRAMES * 9], analog[FRAMES * PER_FRAME * 2];
@@ -54,7 +54,7 @@ static void reads_back(void **state) {
     const mhi_c3d_content c = usual();
     mhi_table *p = NULL, *a = NULL;
     mhe_error err = {0};
-    char path[64];
+    char path[300];
     (void)snprintf(path, sizeof path, "%s/a.c3d", folder);
     assert_int_equal(put(&c, &err), MHE_OK);
     assert_int_equal(mhi_c3d_read(path, &p, &a, &err), MHE_OK);
@@ -91,7 +91,7 @@ static void markers_alone(void **state) {
     mhi_c3d_content c = usual();
     mhi_table *p = NULL, *a = NULL;
     mhe_error err = {0};
-    char path[64];
+    char path[300];
     (void)snprintf(path, sizeof path, "%s/a.c3d", folder);
     c.n_channels = 0;
     c.per_frame = 1;
@@ -136,7 +136,7 @@ static void what_a_c3d_cannot_hold(void **state) {
 }
 
 int main(void) {
-    if (mkdtemp(folder) == NULL) {
+    if (test_folder(folder, sizeof folder) == NULL) {
         return 1;
     }
     const struct CMUnitTest tests[] = {cmocka_unit_test(reads_back),

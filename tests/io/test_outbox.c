@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 static const char *const names[] = {"a", "b", "c"};
-static char folder[512], base[] = "/tmp/mhe-test-outbox-XXXXXX";
+static char folder[512], base[256];
 
 static const char *path_of(const char *name) {
     static char path[1024];
@@ -25,14 +25,7 @@ static const char *path_of(const char *name) {
 
 static int make_base(void **state) {
     (void)state;
-    return mkdtemp(base) == NULL;
-}
-
-static int remove_base(void **state) {
-    (void)state;
-    char command[600];
-    (void)snprintf(command, sizeof command, "rm -rf %s", base);
-    return system(command);
+    return test_folder(base, sizeof base) == NULL;
 }
 
 /* Each test has a folder of its own. */
@@ -243,5 +236,5 @@ int main(void) {
                                        cmocka_unit_test_setup(inputs_are_spared, make_folder),
                                        cmocka_unit_test_setup(what_is_stale, make_folder),
                                        cmocka_unit_test_setup(folders_of_nothing, make_folder)};
-    return cmocka_run_group_tests(tests, make_base, remove_base);
+    return cmocka_run_group_tests(tests, make_base, NULL);
 }

@@ -13,7 +13,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-static char folder[] = "/tmp/mhe-test-sink-XXXXXX";
+static char folder[256];
 
 static const char *path_of(const char *name) {
     static char path[512];
@@ -34,7 +34,7 @@ static int32_t count_files(void) {
 
 static int make_folder(void **state) {
     (void)state;
-    return mkdtemp(folder) == NULL;
+    return test_folder(folder, sizeof folder) == NULL;
 }
 
 static int empty_folder(void **state) {

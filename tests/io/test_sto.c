@@ -331,11 +331,12 @@ static void reference_files(void **state) {
 static void large_file_is_as_from_memory(void **state) {
     (void)state;
     const int32_t rows = 400000;
-    char path[] = "/tmp/mhe-sto-XXXXXX", line[96];
+    char folder[256], path[300], line[96];
     const size_t room = (size_t)rows * 80;
     char *text = malloc(room);
-    const int file = mkstemp(path);
-    assert_true(text != NULL && file >= 0);
+    assert_non_null(text);
+    assert_non_null(test_folder(folder, sizeof folder));
+    (void)snprintf(path, sizeof path, "%s/large.sto", folder);
     size_t n = (size_t)snprintf(text, room, "endheader\ntime\ta\tb\n");
     for (int32_t k = 0; k < rows; k++) {
         const int length = snprintf(line, sizeof line, "%.4f\t%.17g\t%.17g\n", k / 2000.0,
@@ -344,7 +345,7 @@ static void large_file_is_as_from_memory(void **state) {
         n += (size_t)length;
     }
     assert_true(n > 2 * (8u << 20));
-    FILE *out = fdopen(file, "w");
+    FILE *out = fopen(path, "w");
     assert_true(out != NULL && fwrite(text, 1, n, out) == n && fclose(out) == 0);
     mhi_table *lent = NULL, *read = NULL;
     mhe_error err = {0};

@@ -237,8 +237,8 @@ static void what_is_no_recording(void **state) {
 
 static void by_the_name_of_the_file(void **state) {
     (void)state;
-    char folder[] = "/tmp/mhe-xdf-XXXXXX", path[64];
-    assert_non_null(mkdtemp(folder));
+    char folder[256], path[300];
+    assert_non_null(test_folder(folder, sizeof folder));
     (void)snprintf(path, sizeof path, "%s/a.XDF", folder);
     const int fd = open(path, O_WRONLY | O_CREAT, 0600);
     assert_true(fd >= 0);

@@ -81,53 +81,61 @@ static void send_text(client *c, uint32_t type, const char *text) {
 static void send_parameters(client *c, int what) {
     const char *second = what == QTM_OTHER ? "C" : "B";
     char xml[2048], label[256] = "";
-    if (what != QTM_FEWER) {
+    if (what != QTM_FEWER && what != QTM_BARE) {
         (void)snprintf(label, sizeof label,
                        "<Label><Name>%s</Name><RGBColor>255</RGBColor></Label>", second);
     }
     (void)snprintf(
         xml, sizeof xml,
         "<QTM_Parameters_Ver_1.22><General><Frequency>100</Frequency></General>"
-        "<The_3D><AxisUpwards>+Z</AxisUpwards><Labels>%d</Labels><Label><Name>A</Name>"
-        "<RGBColor>255</RGBColor></Label>%s</The_3D>"
+        "<The_3D><AxisUpwards>+Z</AxisUpwards><Labels>%d</Labels>%s%s</The_3D>"
         "<Analog><Device><Device_ID>1</Device_ID><Device_Name>EMG box</Device_Name>"
-        "<Channels>2</Channels><Frequency>500</Frequency><Unit>V</Unit><Range><Min>-5</Min><Max>5"
+        "<Channels>2</Channels><Frequency>%d</Frequency><Unit>V</Unit><Range><Min>-5</Min><Max>5"
         "</Max></Range><Channel><Label>Biceps</Label><Unit>V</Unit></Channel><Channel><Label>"
         "Triceps</Label><Unit>V</Unit></Channel></Device></Analog></QTM_Parameters_Ver_1.22>",
-        what == QTM_FEWER ? 1 : 2, label);
+        what == QTM_FEWER ? 1 : 2,
+        what == QTM_BARE ? "" : "<Label><Name>A</Name><RGBColor>255</RGBColor></Label>", label,
+        what == QTM_SPEED ? 1000 : 500);
     send_text(c, 2, what == QTM_BAD_XML ? "<QTM_Parameters" : xml);
 }
 
 static void send_frame(client *c, int what) {
     packet p = {.n = 0};
+    if (what == QTM_BACK && c->frame >= 20) {
+        c->frame = 0; /* again and again */
+    }
     const int64_t k = c->frame++;
-    const int32_t n_markers = what == QTM_FEWER ? 1 : 2;
+    const int32_t n_markers = what == QTM_FEWER ? 1 : what == QTM_UNLIKE ? 3 : 2;
+    const int32_t samples = what == QTM_SPEED ? 2 * QTM_SAMPLES : QTM_SAMPLES;
     const int analog = c->analog && !(what == QTM_LOSE && k % 2 == 1);
     put(&p, 0, 4);
     put(&p, 3, 4);
     put(&p, (uint64_t)(10000 * k), 8);
     put(&p, (uint64_t)k, 4);
     put(&p, analog ? 2 : 1, 4);
-    put(&p, (uint64_t)(16 + 12 * n_markers), 4);
-    put(&p, 1, 4);
+    put(&p, (uint64_t)(16 + 12 * n_markers) + (what == QTM_SIZE ? 1 << 20 : 0), 4);
+    put(&p, what == QTM_2D ? 7 : 1, 4);
     put(&p, (uint64_t)n_markers + (what == QTM_CUT ? 1000 : 0), 4);
     put(&p, 0, 4);
     for (int32_t i = 0; i < 3 * n_markers; i++) {
         put_float(&p, qtm_marker(k, i / 3, i % 3));
     }
     if (analog) {
-        put(&p, 28 + 8 * QTM_SAMPLES, 4);
+        put(&p, (uint64_t)(28 + 8 * samples), 4);
         put(&p, 3, 4);
         put(&p, 1, 4);
         put(&p, 1, 4);
         put(&p, 2, 4);
-        put(&p, QTM_SAMPLES, 4);
-        put(&p, (uint64_t)(k * QTM_SAMPLES), 4);
-        for (int32_t i = 0; i < 2 * QTM_SAMPLES; i++) {
-            put_float(&p, qtm_analog(k * QTM_SAMPLES + i % QTM_SAMPLES, i / QTM_SAMPLES));
+        put(&p, (uint64_t)samples, 4);
+        put(&p, (uint64_t)(k * samples), 4);
+        for (int32_t i = 0; i < 2 * samples; i++) {
+            put_float(&p, qtm_analog(k * samples + i % samples, i / samples));
         }
     }
     set_size(&p, 0, p.n);
+    if (what == QTM_AMID) {
+        p.n /= 2;
+    }
     send_all(c, &p);
 }
 
@@ -139,7 +147,11 @@ static void send_once(client *c, int what) {
         put(&p, 0xffffffffu, 4);
         put(&p, 3, 4);
         send_all(c, &p);
-    } else if (what == QTM_OTHER) {
+    } else if (what == QTM_SAYS) {
+        send_text(c, 0, "Out of\nlicences");
+    } else if (what == QTM_AMID) {
+        send_frame(c, what);
+    } else if (what == QTM_OTHER || what == QTM_SPEED || what == QTM_BARE) {
         put(&p, 9, 4);
         put(&p, 6, 4);
         put(&p, 11, 1);
@@ -155,7 +167,7 @@ static void send_once(client *c, int what) {
 
 static void answer(client *c, const char *command, int what) {
     if (strncmp(command, "Version", 7) == 0) {
-        send_text(c, 1, "Version set to 1.22");
+        send_text(c, 1, what == QTM_OLD ? "Version NOT supported" : "Version set to 1.22");
     } else if (strncmp(command, "GetParameters", 13) == 0) {
         send_parameters(c, what);
     } else if (strncmp(command, "StreamFrames Stop", 17) == 0) {
@@ -192,12 +204,27 @@ static void listen_to(client *c, int what) {
     }
 }
 
-static void accept_client(qtm_server *s) {
+static void send_welcome(client *c, int what) {
+    static const char text[] = "QTM RT Interface connected";
+    packet p = {.n = 0};
+    if (what != QTM_TURNED) {
+        send_text(c, 1, text);
+        return;
+    }
+    for (size_t i = 0; i < 8; i++) { /* size and type, the high byte first */
+        put(&p, i == 3 ? 8 + sizeof text : i == 7, 1);
+    }
+    memcpy(p.bytes + p.n, text, sizeof text);
+    p.n += sizeof text;
+    send_all(c, &p);
+}
+
+static void accept_client(qtm_server *s, int what) {
     const int fd = accept(s->listener, NULL, NULL);
     for (int32_t i = 0; i < CLIENTS && fd >= 0; i++) {
         if (s->clients[i].fd < 0) {
             s->clients[i] = (client){.fd = fd, .announced = QTM_STREAM};
-            send_text(&s->clients[i], 1, "QTM RT Interface connected");
+            send_welcome(&s->clients[i], what);
             return;
         }
     }
@@ -218,7 +245,7 @@ static void serve(qtm_server *s, client *c, int what) {
     if (c->announced != what) {
         c->announced = what;
         send_once(c, what);
-    } else if (what != QTM_GARBAGE && what != QTM_HUGE && what != QTM_END) {
+    } else if (what != QTM_GARBAGE && what != QTM_HUGE && what != QTM_END && what != QTM_AMID) {
         send_frame(c, what);
     }
     (void)s;
@@ -231,7 +258,7 @@ static void *work(void *data) {
         const int what = atomic_load(&s->what);
         struct pollfd p = {.fd = s->listener, .events = POLLIN};
         if (what != QTM_CLOSE && poll(&p, 1, 0) > 0) {
-            accept_client(s);
+            accept_client(s, what);
         }
         for (int32_t i = 0; i < CLIENTS; i++) {
             if (s->clients[i].fd >= 0) {

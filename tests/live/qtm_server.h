@@ -19,7 +19,17 @@ enum {
     QTM_FEWER,   /* without telling streams marker A alone */
     QTM_END,     /* no more data */
     QTM_BAD_XML, /* parameters that are none */
-    QTM_LOSE     /* every other frame's analog samples are lost */
+    QTM_LOSE,    /* every other frame's analog samples are lost */
+    QTM_TURNED,  /* welcomes in the other byte order */
+    QTM_OLD,     /* does not know the protocol's version */
+    QTM_BARE,    /* has no labelled markers */
+    QTM_2D,      /* data of another component than 3D */
+    QTM_BACK,    /* frames begin anew at time 0 */
+    QTM_AMID,    /* half a packet, then nothing */
+    QTM_UNLIKE,  /* data of three markers, described as two */
+    QTM_SPEED,   /* tells that settings changed: analog samples come at 1000 Hz */
+    QTM_SIZE,    /* components that say they are larger than their packet */
+    QTM_SAYS     /* an error, of two lines */
 };
 
 typedef struct qtm_server qtm_server;

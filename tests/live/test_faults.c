@@ -15,19 +15,14 @@
 #include <unistd.h>
 
 #define ARM MHE_TEST_SOURCE_DIR "/models/arm19"
-#define CONFIG                                                                           \
-    "plugin_path: " TEST_PLUGINS "\n"                                                    \
-    "model: {file: " ARM "/arm19.osim}\n"                                                \
-    "muscle: {curves: paper2021}\n"                                                      \
-    "initial: {q: [-0.1, -0.3, -0.1, 0.1], qdot: [0, 0, 0, 0]}\n"                        \
-    "horizon: {window: 7, ratio: 1}\n"                                                   \
-    "integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03}\n" \
-    "costs: [mhe.cost.emg-markers-high]\n"                                               \
-    "solver: {plugin: mhe.solver.rti, preset: speed}\n"                                  \
-    "realtime: {most_behind: 0}\n"                                                       \
-    "data: {labels: {A: STYLr, B: LARMl}}\n"                                             \
-    "sinks: [{plugin: mhe.sink.files, digits: 17, signals: [q, force, emg, "             \
-    "markers_measured]}%s]\n"                                                            \
+#define CONFIG                                                               \
+    "plugin_path: " TEST_PLUGINS "\n" LIVE_RIG_ARM                           \
+    "initial: {q: [-0.1, -0.3, -0.1, 0.1], qdot: [0, 0, 0, 0]}\n"            \
+    "horizon: {window: 7, ratio: 1}\n"                                       \
+    "costs: [mhe.cost.emg-markers-high]\n"                                   \
+    "data: {labels: {A: STYLr, B: LARMl}}\n"                                 \
+    "sinks: [{plugin: mhe.sink.files, digits: 17, signals: [q, force, emg, " \
+    "markers_measured]}%s]\n"                                                \
     "sources: [%s]\n"
 #define ROUGH                                                                                    \
     "{plugin: test.source.rough, markers: " ARM "/demo_markers.trc, emg: " ARM "/demo_emg.sto, " \
@@ -243,5 +238,5 @@ int main(void) {
         cmocka_unit_test(other_channels),     cmocka_unit_test(another_rate),
         cmocka_unit_test(two_of_one_name),    cmocka_unit_test(a_port_in_use),
         cmocka_unit_test(one_address_alone),  cmocka_unit_test(garbage_on_a_devices_port)};
-    return cmocka_run_group_tests(tests, NULL, live_rig_clean);
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -120,25 +120,15 @@ static void *send(void *data) {
 
 /* ---- the run ---- */
 
-static const char config[] =
-    "model: {file: " MHE_TEST_SOURCE_DIR "/models/arm19/arm19.osim}\n"
-    "muscle: {curves: paper2021}\n"
-    "emg:\n"
-    "  band_low: 20\n"
-    "  band_high: 450\n"
-    "  low_pass: 6\n"
-    "  channels:\n"
+static const char config[] = LIVE_RIG_ARM LIVE_RIG_EMG
     "    - {name: DeltMed, muscles: [Deltoid2], mvc: 0.00043}\n"
     "    - {name: Triceps, muscles: [TricepsLong, TricepsLat, TricepsMed], mvc: 0.0011}\n"
     "    - {name: Biceps, muscles: [BicepsLong, BicepsShort], mvc: 0.00129}\n"
     "    - {name: Brach, muscles: [BRA], mvc: 0.0006}\n"
     "horizon: {window: 7, ratio: 1}\n"
-    "integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03}\n"
     "costs:\n"
     "  - plugin: mhe.cost.emg-markers-high\n"
     "    tracked: [Deltoid2, TricepsLong, TricepsLat, TricepsMed, BicepsLong, BicepsShort, BRA]\n"
-    "solver: {plugin: mhe.solver.rti, preset: speed}\n"
-    "realtime: {most_behind: 0}\n"
     "sinks: [{plugin: mhe.sink.files, digits: 17, signals: [q, markers, markers_measured]}]\n"
     "sources: [{plugin: mhe.source.lsl, markers: [\"name='odd-markers'\"], emg: "
     "[\"name='odd-emg'\"]}]\n";
@@ -225,7 +215,6 @@ int main(void) {
     mhe_table *m = NULL, *e = NULL;
     if (!lsl_rig_open(live_rig_folder(), &rig)) {
         (void)puts("skipped: there is no liblsl (vendor/take fetches it)");
-        (void)live_rig_clean(NULL);
         return TEST_SKIPPED;
     }
     if (mhe_table_read_markers(RECORDING, &m, NULL) != MHE_OK ||
@@ -234,7 +223,7 @@ int main(void) {
         mhe_table_describe(e, &emg, NULL) != MHE_OK || markers.n_columns + EXTRA > 512) {
         return 1;
     }
-    const int failed = cmocka_run_group_tests(tests, NULL, live_rig_clean);
+    const int failed = cmocka_run_group_tests(tests, NULL, NULL);
     mhe_table_close(m);
     mhe_table_close(e);
     return failed;

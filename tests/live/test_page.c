@@ -13,17 +13,13 @@
 
 #define RECORDING MHE_TEST_SOURCE_DIR "/models/arm19/demo_recording.c3d"
 #define CONFIG                                                                                     \
-    "model: {file: " MHE_TEST_SOURCE_DIR "/models/arm19/arm19.osim}\n"                             \
-    "muscle: {curves: paper2021}\n"                                                                \
+    LIVE_RIG_ARM                                                                                   \
     "emg:\n"                                                                                       \
     "  channels:\n"                                                                                \
     "    - {name: DeltMed, muscles: [Deltoid2], mvc: 0.00043}\n"                                   \
     "    - {name: Biceps, muscles: [BicepsLong, BicepsShort], mvc: 0.00129}\n"                     \
     "horizon: {window: 7, ratio: 1}\n"                                                             \
-    "integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03}\n"           \
     "costs: [{plugin: mhe.cost.emg-markers-high, tracked: [Deltoid2, BicepsLong, BicepsShort]}]\n" \
-    "solver: {plugin: mhe.solver.rti, preset: speed}\n"                                            \
-    "realtime: {most_behind: 0}\n"                                                                 \
     "sinks:\n"                                                                                     \
     "  - {plugin: mhe.sink.files, digits: 17, signals: [q, force]}\n"                              \
     "  - {plugin: mhe.sink.web, port: %d}\n"                                                       \
@@ -89,5 +85,5 @@ static void in_the_browser(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {cmocka_unit_test(in_the_browser)};
-    return cmocka_run_group_tests(tests, NULL, live_rig_clean);
+    return cmocka_run_group_tests(tests, NULL, NULL);
 }

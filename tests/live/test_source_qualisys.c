@@ -42,7 +42,7 @@ static void take_chunk(void *data, const mhe_chunk *chunk) {
             }
             r->n_frames++;
         } else { /* the packet's time is that of its last sample */
-            const int64_t n = llround(500 * chunk->stamp[k]) + QTM_SAMPLES - 1;
+            const int64_t n = llround(info.rate * chunk->stamp[k]) + llround(info.rate / 100) - 1;
             for (int32_t i = 0; i < info.n_channels; i++) {
                 r->n_wrong += v[i] != (double)qtm_analog(n, i);
             }
@@ -220,6 +220,95 @@ static void faults(void **state) {
     fault(QTM_CUT, MHE_SOURCE_WARNING, "cut short");
     fault(QTM_END, MHE_SOURCE_LOST, "no more data");
     fault(QTM_LOSE, MHE_SOURCE_WARNING, "5 analog samples were lost");
+    fault(QTM_SIZE, MHE_SOURCE_WARNING, "cut short or larger");
+    fault(QTM_SAYS, MHE_SOURCE_WARNING, "QTM says: Out of?licences");
+    fault(QTM_2D, MHE_SOURCE_LOST, "no 3D data for two seconds");
+    fault(QTM_AMID, MHE_SOURCE_LOST, "in the middle of a packet");
+    fault(QTM_BARE, MHE_SOURCE_LOST, "no labelled markers");
+}
+
+/* What a server says before it streams: told while it is waited for, none of it ends the run. */
+static void a_server_that_is_no_use(void **state) {
+    (void)state;
+    static const struct {
+        int what;
+        const char *says;
+        mhe_status status;
+    } cases[] = {{QTM_TURNED, "its little-endian port is one below", MHE_E_INPUT},
+                 {QTM_OLD, "QTM says: Version NOT supported", MHE_RETRY},
+                 {QTM_BARE, "QTM has no labelled markers", MHE_RETRY}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        qtm_server *server = qtm_server_start(0);
+        reader r;
+        mhe_error err = {0};
+        assert_non_null(server);
+        qtm_server_set(server, cases[i].what);
+        begin_reader(&r, qtm_server_port(server), "");
+        assert_int_equal(open_reader(&r, cases[i].says, &err), cases[i].status);
+        if (strstr(err.text, cases[i].says) == NULL) {
+            fail_msg("'%s' does not say '%s'", err.text, cases[i].says);
+        }
+        r.ops->destroy(r.self);
+        qtm_server_stop(server);
+    }
+}
+
+/* Times that go back are the core's to deal with; the source hands all frames on. */
+static void frames_that_go_back(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    read_frames(&r, 10);
+    qtm_server_set(server, QTM_BACK);
+    read_frames(&r, 100);
+    assert_int_equal(r.seen[MHE_SOURCE_LOST] + r.seen[MHE_SOURCE_WARNING], 0);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+static void another_rate(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    mhe_stream_info info = {.size = sizeof info};
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    read_frames(&r, 10);
+    qtm_server_set(server, QTM_SPEED);
+    read_until(&r, MHE_SOURCE_CHANGED, 1, "other markers or channels");
+    assert_int_equal(r.ops->stream(r.self, 1, &info, NULL), MHE_OK);
+    assert_true(info.rate == 1000);
+    const int32_t before = r.n_analog;
+    read_frames(&r, 20);
+    assert_true(r.n_analog - before >= 2 * QTM_SAMPLES * 19);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
+}
+
+/* Data that differ from what is described for good are told once, not with every frame. */
+static void unlike_its_settings(void **state) {
+    (void)state;
+    qtm_server *server = qtm_server_start(0);
+    reader r;
+    begin_reader(&r, qtm_server_port(server), "");
+    open_well(&r);
+    read_frames(&r, 10);
+    qtm_server_set(server, QTM_UNLIKE);
+    read_until(&r, MHE_SOURCE_WARNING, 1, "other numbers of markers");
+    const int32_t analog = r.n_analog;
+    const double until = now() + PATIENCE;
+    while (r.n_analog < analog + 500 * QTM_SAMPLES && now() < until) {
+        read_once(&r); /* longer than it waits before it asks again */
+    }
+    assert_true(r.n_analog >= analog + 500 * QTM_SAMPLES);
+    assert_int_equal(r.seen[MHE_SOURCE_WARNING], 1);
+    assert_int_equal(r.seen[MHE_SOURCE_CHANGED], 0);
+    qtm_server_set(server, QTM_STREAM);
+    read_frames(&r, 10);
+    r.ops->destroy(r.self);
+    qtm_server_stop(server);
 }
 
 /* The server is started anew on the same port. */
@@ -269,6 +358,10 @@ int main(void) {
                                        cmocka_unit_test(markers_alone),
                                        cmocka_unit_test(what_is_not_there),
                                        cmocka_unit_test(faults),
+                                       cmocka_unit_test(a_server_that_is_no_use),
+                                       cmocka_unit_test(frames_that_go_back),
+                                       cmocka_unit_test(another_rate),
+                                       cmocka_unit_test(unlike_its_settings),
                                        cmocka_unit_test(started_again),
                                        cmocka_unit_test(other_markers)};
     return cmocka_run_group_tests(tests, NULL, NULL);

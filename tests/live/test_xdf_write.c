@@ -10,8 +10,8 @@
 
 static void to_the_bit(void **state) {
     (void)state;
-    char folder[] = "/tmp/mhe-xdf-XXXXXX", path[64];
-    assert_non_null(mkdtemp(folder));
+    char folder[256], path[300];
+    assert_non_null(test_folder(folder, sizeof folder));
     (void)snprintf(path, sizeof path, "%s/a.xdf", folder);
     mhi_xdf_writer *w = NULL;
     mhi_xdf *back = NULL;

@@ -12,9 +12,7 @@ static mhi_registry *registry;
 
 static int make_folder(void **state) {
     (void)state;
-    (void)snprintf(folder, sizeof folder, "%s/noise-config-XXXXXX",
-                   getenv("TMPDIR") != NULL ? getenv("TMPDIR") : "/tmp");
-    if (mkdtemp(folder) == NULL) {
+    if (test_folder(folder, sizeof folder) == NULL) {
         return 1;
     }
     (void)snprintf(path, sizeof path, "%s/noise.yaml", folder);

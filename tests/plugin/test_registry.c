@@ -99,9 +99,9 @@ static void folders_that_cannot_be_searched_are_told(void **state) {
 /* Whoever has an account here could put code into such a folder. */
 static void folders_of_everybody_are_refused(void **state) {
     (void)state;
-    char base[] = "/tmp/mhe-test-trust-XXXXXX", path[64], file[128];
+    char base[256], path[300], file[320];
     mhe_error err = {0};
-    assert_non_null(mkdtemp(base));
+    assert_non_null(test_folder(base, sizeof base));
     (void)snprintf(path, sizeof path, "%s/plugins", base);
     (void)snprintf(file, sizeof file, "%s/first.so", path);
     assert_int_equal(mkdir(path, 0755), 0);

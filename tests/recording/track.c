@@ -31,9 +31,9 @@ static void expect_ok(mhe_status status, const mhe_error *err) {
 /* The shipped config in a folder of its own, beside a link to the data. */
 static void read_config(track *t, const char *name, const char *data, const char *const *set,
                         int32_t n_set) {
-    char folder[] = "/tmp/mhe-recording-XXXXXX", config[64], link[64], command[1500];
+    char folder[256], config[300], link[300], command[1500];
     mhe_error err = {0};
-    assert_non_null(mkdtemp(folder));
+    assert_non_null(test_folder(folder, sizeof folder));
     (void)snprintf(link, sizeof link, "%s/abduction", folder);
     (void)snprintf(config, sizeof config, "%s/%s", folder, name);
     (void)snprintf(command, sizeof command, "cp %s/models/abduction/%s %s", MHE_TEST_SOURCE_DIR,

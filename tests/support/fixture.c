@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "fixture.h"
+#include "support.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -43,9 +44,7 @@ mhe_status test_fixture_open(test_fixture *f, const char *yaml) {
     *f = (test_fixture){.host = {.size = sizeof f->host, .log = count_line, .service = no_service}};
     f->host.data = f;
     char path[300];
-    (void)snprintf(f->folder, sizeof f->folder, "%s/mhe-test-XXXXXX",
-                   getenv("TMPDIR") != NULL ? getenv("TMPDIR") : "/tmp");
-    if (mkdtemp(f->folder) == NULL) {
+    if (test_folder(f->folder, sizeof f->folder) == NULL) {
         return mhe_fail(&f->err, MHE_E_IO, "no temporary folder");
     }
     (void)snprintf(path, sizeof path, "%s/config.yaml", f->folder);

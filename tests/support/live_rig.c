@@ -10,23 +10,10 @@
 
 #define PATIENCE 60.0 /* s until a test gives up; nothing is judged by its speed */
 
-static char folder[64];
+static char folder[256];
 
 const char *live_rig_folder(void) {
-    if (folder[0] == '\0') {
-        (void)strcpy(folder, "/tmp/mhe-live-XXXXXX");
-        if (mkdtemp(folder) == NULL) {
-            folder[0] = '\0';
-        }
-    }
-    return folder;
-}
-
-int live_rig_clean(void **state) {
-    (void)state;
-    char command[100];
-    (void)snprintf(command, sizeof command, "rm -rf %s", folder);
-    return folder[0] == '\0' ? 0 : system(command);
+    return folder[0] != '\0' || test_folder(folder, sizeof folder) != NULL ? folder : "";
 }
 
 static void keep(const mhe_host *host, int32_t level, const char *text) {
@@ -70,7 +57,7 @@ int live_words_wait(live_words *w, const char *text, int32_t times) {
 }
 
 mhe_status live_rig_run(live_rig *r) {
-    char out[128];
+    char out[512];
     const mhe_host host = {.size = sizeof host, .data = &r->words, .log = keep, .service = none};
     mhe_config *config = NULL;
     pthread_t thread;
@@ -107,7 +94,7 @@ void live_rig_must_run(live_rig *r) {
 }
 
 int live_rig_same(const char *a, const char *b, const char *file) {
-    char command[400];
+    char command[1400];
     const char *in = live_rig_folder();
     (void)snprintf(command, sizeof command, "test -s %s/%s/%s && cmp %s/%s/%s %s/%s/%s", in, a,
                    file, in, a, file, in, b, file);
@@ -146,7 +133,7 @@ int live_rig_wait_frames(live_rig *r, int32_t more) {
 }
 
 double *live_rig_table(const char *name, const char *file, int32_t *n_rows, int32_t *n_columns) {
-    char path[256];
+    char path[512];
     mhe_table *table = NULL;
     mhe_table_info info = {.size = sizeof info};
     mhe_error err = {0};

@@ -11,9 +11,18 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-/* A folder of the test's own; "" where none can be made. Removed by live_rig_clean. */
+/* Sections of their configs: the arm by two-stage collocation, each frame estimated. */
+#define LIVE_RIG_ARM                                                                     \
+    "model: {file: " MHE_TEST_SOURCE_DIR "/models/arm19/arm19.osim}\n"                   \
+    "muscle: {curves: paper2021}\n"                                                      \
+    "integrator: {plugin: mhe.integrator.rk, tolerance: 0, stages: 2, max_step: 0.03}\n" \
+    "solver: {plugin: mhe.solver.rti, preset: speed}\n"                                  \
+    "realtime: {most_behind: 0}\n"
+/* The filters of raw EMG at 2000 Hz; its channels follow, a line each. */
+#define LIVE_RIG_EMG "emg:\n  band_low: 20\n  band_high: 450\n  low_pass: 6\n  channels:\n"
+
+/* A folder of the test's own; "" where none can be made. */
 const char *live_rig_folder(void);
-int live_rig_clean(void **state);
 
 /* What a run tells, readable while it runs. */
 typedef struct live_words {

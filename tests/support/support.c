@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#define _XOPEN_SOURCE 700 /* nftw, mkdtemp */
 #include "support.h"
 
+#include <ftw.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,6 +16,40 @@ const char *test_data_path(char *out, size_t size, const char *file) {
     }
     int n = snprintf(out, size, "%s/data/%s", shared, file);
     return n > 0 && (size_t)n < size && access(out, R_OK) == 0 ? out : NULL;
+}
+
+#define MOST_FOLDERS 256
+static char folders[MOST_FOLDERS][256];
+static int n_folders;
+static pid_t owner; /* a child that ends leaves the folders alone */
+
+static int remove_one(const char *path, const struct stat *about, int kind, struct FTW *walk) {
+    (void)about, (void)kind, (void)walk;
+    return remove(path);
+}
+
+static void remove_folders(void) {
+    for (int i = 0; i < n_folders && getpid() == owner; i++) {
+        (void)nftw(folders[i], remove_one, 8, FTW_DEPTH | FTW_PHYS);
+    }
+}
+
+const char *test_folder(char *out, size_t size) {
+    const char *below = getenv("TMPDIR") != NULL ? getenv("TMPDIR") : "/tmp";
+    if (n_folders == MOST_FOLDERS) {
+        return NULL;
+    }
+    char *made = folders[n_folders];
+    const int n = snprintf(made, sizeof folders[0], "%s/mhe-test-XXXXXX", below);
+    if (n < 0 || (size_t)n >= sizeof folders[0] || (size_t)n >= size || mkdtemp(made) == NULL) {
+        return NULL;
+    }
+    if (n_folders++ == 0) {
+        owner = getpid();
+        (void)atexit(remove_folders);
+    }
+    memcpy(out, made, (size_t)n + 1);
+    return out;
 }
 
 double test_random(uint64_t *seed, double lower, double upper) {

@@ -17,6 +17,10 @@
  * main or call skip(). */
 const char *test_data_path(char *out, size_t size, const char *file);
 
+/* A new folder of the test's own, below $TMPDIR or /tmp, in `out`, and what is in it; it is removed
+ * when the process ends. NULL: it cannot be made. */
+const char *test_folder(char *out, size_t size);
+
 /* y = f(x) with n_x inputs and n_y outputs. */
 typedef int (*test_function)(void *data, const double *x, double *y);
 

@@ -80,8 +80,9 @@ mhe_status mhi_calibration_choose(mhi_calibration *c, mhe_error *err);
 double mhi_calibration_of(const mhi_calibration *c, int32_t kind, int32_t muscle);
 const mhi_estimated *mhi_calibration_find(const mhi_calibration *c, int32_t kind, int32_t subject,
                                           int32_t axis);
-/* persons.c: MHE_E_INPUT: markers of one body differ in their distance from recording to recording.
- */
+/* persons.c. Recordings that are there twice are told. */
+void mhi_calibration_tell_copies(const mhi_calibration *c);
+/* MHE_E_INPUT: markers of one body differ in their distance from recording to recording. */
 mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err);
 /* motion.c: recordings and the motion that the estimator finds in them with the model as it is. */
 mhe_status mhi_motion_read(mhi_calibration *c, int32_t i, mhe_error *err);

@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* persons.c: are all recordings of one person? Markers of one body keep their distance. */
+/* persons.c: are all recordings of one person, and none there twice? Markers of one body keep their
+ * distance. */
 #include "calibrate/calibrate.h"
 
 #include <math.h>
+#include <string.h>
 
 #define FARTHEST 0.008 /* m that skin, and a day between two recordings, may change a distance */
 #define SHARE 0.08     /* ... and which part of it */
@@ -45,6 +47,45 @@ static odd farthest(const mhe_description *model, const mhi_recording *one,
         }
     }
     return most;
+}
+
+static int same_values(const double *a, const double *b, ptrdiff_t n) {
+    return a == NULL || b == NULL ? a == b : memcmp(a, b, sizeof *a * (size_t)n) == 0;
+}
+
+/* Of one recording, whatever its files are called. */
+static int is_copy(const mhe_description *model, const mhi_recording *a, const mhi_recording *b) {
+    const ptrdiff_t n = a->n_frames;
+    return a->n_frames == b->n_frames &&
+           same_values(a->markers, b->markers, n * 3 * model->n_markers) &&
+           same_values(a->emg, b->emg, n * model->n_muscles) &&
+           same_values(a->angles, b->angles, n * model->n_coordinates);
+}
+
+static const char *name_of(const mhi_motion *m) {
+    return m->run.data.markers != NULL ? m->run.data.markers : m->run.data.angles;
+}
+
+void mhi_calibration_tell_copies(const mhi_calibration *c) {
+    for (int32_t i = 1; i < c->plan.n_recordings; i++) {
+        const int32_t held = c->plan.recordings[i].hold_out;
+        for (int32_t k = 0; k < i; k++) {
+            if (!is_copy(c->model, c->motions[k].recording, c->motions[i].recording)) {
+                continue;
+            }
+            mhi_text line = {0};
+            mhi_text_add(&line, "recordings %d (%s) and %d (%s) are the same: %s", (int)k + 1,
+                         name_of(&c->motions[k]), (int)i + 1, name_of(&c->motions[i]),
+                         held != c->plan.recordings[k].hold_out
+                             ? "what is held out was learned from"
+                             : "it counts twice");
+            if (!line.failed) {
+                c->host->log(c->host, MHE_LOG_WARNING, line.data);
+            }
+            mhi_text_free(&line);
+            break;
+        }
+    }
 }
 
 mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err) {

@@ -423,7 +423,11 @@ mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry
         status = mhi_motion_read(c, i, err);
     }
     status = status == MHE_OK ? check_emg(c, err) : status;
-    return status == MHE_OK ? mhi_calibration_check_person(c, err) : status;
+    if (status == MHE_OK) {
+        mhi_calibration_tell_copies(c);
+        status = mhi_calibration_check_person(c, err);
+    }
+    return status;
 }
 
 void mhi_calibration_close(mhi_calibration *c) {

@@ -244,6 +244,9 @@ mhe_status mhi_run_read_costs(mhi_run *run, mhi_registry *registry, const mhi_no
  * data.external_loads; `key`: where the run's tree names it. [cold] */
 mhe_status mhi_run_read_loads(mhi_run *run, mhi_registry *registry, const char *file,
                               const mhi_node *key, mhi_use *use, mhe_error *err);
+/* A failure that says of a file that it cannot be opened gets the line that names it in front,
+ * where a value of the run's tree does. Returns `status`. */
+mhe_status mhi_run_locate_file(const mhi_run *run, mhe_status status, mhe_error *err);
 void mhi_run_free(mhi_run *run);
 
 /* "plugin: ...", its own keys and the section's of the model section, behind `indent` blanks. */

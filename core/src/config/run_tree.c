@@ -92,3 +92,42 @@ mhe_status mhi_run_read_tree(mhi_run *run, const mhi_run_text *text, const char 
     }
     return status;
 }
+
+/* The scalar below `node` that names the file `path` [n]; NULL: none does. */
+static const mhi_node *find_path(const mhi_run *run, const mhi_node *node, const char *path,
+                                 size_t n) {
+    if (node->kind == MHI_SCALAR) {
+        const char *text = node->text == NULL ? "" : node->text;
+        while (strncmp(text, "./", 2) == 0) {
+            text += 2;
+        }
+        const size_t length = strlen(text), below = strlen(run->dir);
+        if (text[0] == '/') {
+            return length == n && strncmp(text, path, n) == 0 ? node : NULL;
+        }
+        return length > 0 && n == below + 1 + length && strncmp(path, run->dir, below) == 0 &&
+                       path[below] == '/' && strncmp(path + below + 1, text, length) == 0
+                   ? node
+                   : NULL;
+    }
+    const mhi_node *found = NULL;
+    for (const mhi_node *i = node->first; i != NULL && found == NULL; i = i->next) {
+        found = find_path(run, i, path, n);
+    }
+    return found;
+}
+
+mhe_status mhi_run_locate_file(const mhi_run *run, mhe_status status, mhe_error *err) {
+    static const char *const ends[] = {": cannot be opened", ": is a folder"};
+    for (size_t i = 0; i < 2 && status < 0 && err != NULL && run->tree != NULL; i++) {
+        const char *end = strstr(err->text, ends[i]);
+        const mhi_node *node = end == NULL ? NULL
+                                           : find_path(run, mhi_tree_root(run->tree), err->text,
+                                                       (size_t)(end - err->text));
+        if (node != NULL) {
+            const mhe_error why = *err;
+            return mhi_fail_at(err, status, run->tree, node, "%s", why.text);
+        }
+    }
+    return status;
+}

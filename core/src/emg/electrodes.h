@@ -61,9 +61,10 @@ double mhi_electrodes_filter_delay(const mhi_electrodes *electrodes);
 double mhi_electrodes_lag(const mhi_electrodes *electrodes);
 
 /* Envelope at maximal contraction of each channel [channels]: as given, from emg.mvc_file, or 1.
- * MHE_E_INPUT: the file. [cold] */
+ * A file that no channel needs is told to `host` (NULL: to nobody). MHE_E_INPUT: the file. [cold]
+ */
 mhe_status mhi_electrodes_mvc(const mhi_run *run, const mhe_description *model, double *mvc,
-                              mhe_error *err);
+                              const mhe_host *host, mhe_error *err);
 
 /* For samples that come live: with the MVC that the config says. MHE_E_CONFIG: there are no
  * channels, or they ask for what looks ahead. [cold] */

@@ -92,14 +92,26 @@ static mhe_status read_mvc_file(const mhi_run *run, const mhe_description *model
 }
 
 mhe_status mhi_electrodes_mvc(const mhi_run *run, const mhe_description *model, double *mvc,
-                              mhe_error *err) {
+                              const mhe_host *host, mhe_error *err) {
     int32_t open = 0;
     for (int32_t i = 0; i < run->emg.n_channels; i++) {
         const double given = run->emg.channels[i].mvc;
         mvc[i] = given > 0 ? given : 1;
         open += given <= 0;
     }
-    return open > 0 && run->emg.mvc_file != NULL ? read_mvc_file(run, model, mvc, err) : MHE_OK;
+    if (open == 0 && run->emg.mvc_file != NULL && host != NULL) {
+        mhi_text line = {0};
+        mhi_text_add(&line,
+                     "emg.mvc_file: %s is not looked at: each channel has an 'mvc' of its own",
+                     run->emg.mvc_file);
+        if (!line.failed) {
+            host->log(host, MHE_LOG_WARNING, line.data);
+        }
+        mhi_text_free(&line);
+    }
+    const mhe_status status =
+        open > 0 && run->emg.mvc_file != NULL ? read_mvc_file(run, model, mvc, err) : MHE_OK;
+    return mhi_run_locate_file(run, status, err);
 }
 
 mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model, mhi_table *table,
@@ -112,7 +124,7 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
                             ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                             : mhi_emg_check_times(table, run->data.emg_offset, time, n_frames, err);
     if (status == MHE_OK) {
-        status = mhi_electrodes_mvc(run, model, mvc, err);
+        status = mhi_electrodes_mvc(run, model, mvc, host, err);
     }
     if (status == MHE_OK) {
         int32_t *column = calloc((size_t)run->emg.n_channels + 1, sizeof *column);

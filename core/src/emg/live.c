@@ -45,7 +45,7 @@ mhe_status mhi_electrodes_open_live(const mhi_run *run, const mhe_description *m
     }
     double *mvc = calloc((size_t)run->emg.n_channels, sizeof *mvc);
     status = mvc == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-                         : mhi_electrodes_mvc(run, model, mvc, err);
+                         : mhi_electrodes_mvc(run, model, mvc, NULL, err);
     if (status == MHE_OK) {
         status = mhi_electrodes_open(run, model, run->path, columns, n_columns, rate, mvc,
                                      electrodes, err);

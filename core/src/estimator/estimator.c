@@ -15,7 +15,7 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
     const mhi_model_section *section = &run->model_file;
     mhe_status status = mhi_model_read(section->file, description, err);
     if (status != MHE_OK) {
-        return status;
+        return mhi_run_locate_file(run, status, err);
     }
     const mhe_description *d = *description;
     for (int32_t i = 0; i < d->n_warnings; i++) {
@@ -30,7 +30,8 @@ mhe_status mhi_estimator_read_model(const mhi_run *run, const mhe_host *host,
                         d->unsupported[0], d->n_unsupported, d->n_unsupported == 1 ? "" : "s");
     }
     status = mhi_estimator_lock(run, *description, err);
-    return status == MHE_OK ? mhi_estimator_motion(run, *description, host, err) : status;
+    status = status == MHE_OK ? mhi_estimator_motion(run, *description, host, err) : status;
+    return mhi_run_locate_file(run, status, err);
 }
 
 mhe_status mhi_estimator_locate(const mhi_run *run, mhe_status status, mhe_error *err) {
@@ -51,7 +52,7 @@ mhe_status mhi_estimator_locate(const mhi_run *run, mhe_status status, mhe_error
         found = found->node != NULL ? found : NULL; /* of one by default */
     }
     if (found == NULL) {
-        return status;
+        return mhi_run_locate_file(run, status, err);
     }
     const mhe_error why = *err;
     return mhi_fail_at(err, status, run->tree, found->node, "%s", why.text);

@@ -275,7 +275,7 @@ mhe_status mhi_recording_read(const mhi_run *run, const mhe_description *d, cons
     }
     if (status != MHE_OK) {
         mhi_recording_free(r);
-        return status;
+        return mhi_run_locate_file(run, status, err);
     }
     *recording = r;
     return MHE_OK;

@@ -106,6 +106,16 @@ static mhe_status open_read(mhi_inspected *m, int32_t paths, mhe_error *err) {
     return status != MHE_OK ? status : open_muscles(m, err);
 }
 
+/* What a plugin says of the model begins with the plugin: the file is put in front. */
+static mhe_status open_named(mhi_inspected *m, const char *name, int32_t paths, mhe_error *err) {
+    const mhe_status status = open_read(m, paths, err);
+    if (status == MHE_OK || err == NULL || strncmp(err->text, name, strlen(name)) == 0) {
+        return status;
+    }
+    const mhe_error why = *err;
+    return mhe_fail(err, status, "%s: %s", name, why.text);
+}
+
 mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char *file,
                               int32_t paths, mhe_error *err) {
     *m = (mhi_inspected){.host = mhi_host_or_silent(host)};
@@ -113,7 +123,7 @@ mhe_status mhi_inspected_open(mhi_inspected *m, const mhe_host *host, const char
     if (status == MHE_OK) {
         status = mhi_model_read_unlocked(file, &m->all, err);
     }
-    return status == MHE_OK ? open_read(m, paths, err) : status;
+    return status == MHE_OK ? open_named(m, file, paths, err) : status;
 }
 
 mhe_status mhi_inspected_parse(mhi_inspected *m, const mhe_host *host, const char *name,
@@ -123,7 +133,7 @@ mhe_status mhi_inspected_parse(mhi_inspected *m, const mhe_host *host, const cha
     if (status == MHE_OK) {
         status = mhi_osim_parse_unlocked(name, text, length, &m->all, err);
     }
-    return status == MHE_OK ? open_read(m, paths, err) : status;
+    return status == MHE_OK ? open_named(m, name, paths, err) : status;
 }
 
 void mhi_inspected_close(mhi_inspected *m) {

@@ -255,7 +255,7 @@ static mhe_status open_electrodes(const mhi_inlet_setup *s, const mhi_stream *ab
     }
     double *mvc = calloc((size_t)n + 1, sizeof *mvc);
     mhe_status status =
-        mvc == NULL ? no_memory(err) : mhi_electrodes_mvc(s->run, s->model, mvc, err);
+        mvc == NULL ? no_memory(err) : mhi_electrodes_mvc(s->run, s->model, mvc, s->host, err);
     if (status == MHE_OK && s->run->emg.process && s->run->emg.zero_phase) {
         status = mhe_fail(err, MHE_E_CONFIG,
                           "emg.zero_phase looks ahead; live there is nothing "

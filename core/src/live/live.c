@@ -34,10 +34,12 @@ static const void *host_service(const mhe_host *host, const char *id) {
 static mhe_status start_sources(mhe_live *l, mhe_error *err) {
     const mhi_use_list *list = &l->run->sources;
     if (list->n == 0) {
-        return mhe_fail(err, MHE_E_CONFIG,
-                        "%s: there is no section 'sources': where do the data come from? As in "
-                        "sources: [{plugin: ID, ...}] (mhe-run --list-plugins)",
-                        l->run->path);
+        const mhi_node *empty = mhi_node_find(mhi_tree_root(l->run->tree), "sources");
+        return mhi_fail_at(err, MHE_E_CONFIG, l->run->tree, empty,
+                           "%s: where do the data come from? As in sources: [{plugin: ID, ...}] "
+                           "(mhe-run --list-plugins)",
+                           empty == NULL ? "there is no section 'sources'"
+                                         : "the section 'sources' is empty");
     }
     l->intakes = calloc((size_t)list->n, sizeof(mhi_intake *));
     if (l->intakes == NULL) {

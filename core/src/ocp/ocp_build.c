@@ -112,23 +112,6 @@ static double *filled(mhi_arena *arena, ptrdiff_t n, double value) {
     return array;
 }
 
-/* Of a worker, for the parameters. */
-static mhe_status take_parameter_room(const mhi_ocp *ocp, mhi_arena *arena, mhi_ocp_worker *w,
-                                      mhe_error *err) {
-    const int32_t n_p = ocp->face.n_p, n_z = ocp->n_x + ocp->face.n_u;
-    w->P = MHI_TAKE(arena, double, ocp->n_x *mhi_system_face(ocp->system)->n_p);
-    w->room = MHI_TAKE(arena, double, mhi_parameters_room(ocp->system));
-    w->by = MHI_TAKE(arena, mhi_by_parameter, ocp->signals.n_y);
-    w->by_p = (mhi_term_by_p){.by = w->by,
-                              .n_p = n_p,
-                              .gradient = MHI_TAKE(arena, double, n_p),
-                              .pz = MHI_TAKE(arena, double, n_p *n_z),
-                              .pp = MHI_TAKE(arena, double, n_p *n_p)};
-    return !w->P || !w->room || !w->by || !w->by_p.gradient || !w->by_p.pz || !w->by_p.pp
-               ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
-               : MHE_OK;
-}
-
 static mhe_status create_worker(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err) {
     const int32_t n_z = ocp->face.n_x + ocp->face.n_u;
     w->terms = MHI_TAKE(&ocp->arena, mhi_term_workspace, ocp->n_terms);
@@ -153,7 +136,7 @@ static mhe_status create_worker(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err)
         status = mhi_ocp_enter_joints(ocp, w, err);
     }
     if (status == MHE_OK && ocp->estimated != NULL) {
-        status = take_parameter_room(ocp, &ocp->arena, w, err);
+        status = mhi_ocp_take_parameter_room(ocp, w, err);
     }
     for (int32_t i = 0; i < ocp->n_terms && status == MHE_OK; i++) {
         status = mhi_term_workspace_create(&ocp->terms[i], n_z, &ocp->arena, &w->terms[i], err);
@@ -308,74 +291,6 @@ static mhe_status create_term(mhi_ocp *ocp, const mhi_ocp_setup *setup, int32_t 
     return status;
 }
 
-/* A cost that calibration has no place for. */
-static mhe_status refuse(const mhi_ocp *ocp, int32_t term, const char *why, mhe_error *err) {
-    const mhe_status status =
-        mhe_fail(err, MHE_E_CONFIG,
-                 "costs.%d: %s reads %s. Leave it out here, and add it to the config that is left "
-                 "behind",
-                 term, ocp->terms[term].id, why);
-    if (err != NULL) {
-        err->part = MHE_PART_COST;
-        err->entry = term;
-    }
-    return status;
-}
-
-static int32_t reads_before(const mhi_term *t) {
-    int32_t before = 0;
-    for (int32_t s = 0; s < t->n_signals; s++) {
-        before |= t->layout.at[s] == MHE_AT_PREVIOUS;
-    }
-    return before;
-}
-
-/* What is estimated, and motions in a row. */
-static mhe_status set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
-    const uint32_t reactions = ((1u << MHI_MAX_REACTIONS) - 1) << MHI_SIGNAL_REACTION;
-    const uint32_t forces =
-        1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT | reactions;
-    mhe_status status = MHE_OK;
-    ocp->node_weight = setup->node_weight;
-    if (setup->parameters == NULL && setup->junctions == NULL) {
-        return MHE_OK;
-    }
-    ocp->face.low_rank = NULL;
-    for (int32_t i = 0; i < ocp->n_terms; i++) {
-        if (reads_before(&ocp->terms[i])) {
-            return refuse(ocp, i, "the node before: calibration has no place for that", err);
-        }
-    }
-    ocp->prior_at = MHI_TAKE(&ocp->arena, const double *, setup->n_intervals + 1);
-    if (ocp->prior_at == NULL) {
-        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
-    }
-    if (setup->junctions != NULL) {
-        status =
-            mhi_junction_create(setup->system, setup->junctions, &ocp->arena, &ocp->junction, err);
-    }
-    if (status != MHE_OK || setup->parameters == NULL) {
-        return status;
-    }
-    for (int32_t i = 0; i < ocp->n_terms; i++) {
-        const uint32_t reads = mhi_term_reads(&ocp->terms[i]);
-        if ((reads & forces) != 0 || ocp->terms[i].layout.jacobian != MHE_JACOBIAN_DIAGONAL) {
-            return refuse(ocp, i,
-                          "muscle forces or several signals at once: calibration has no "
-                          "derivatives of that by parameters",
-                          err);
-        }
-    }
-    ocp->estimated = setup->estimated;
-    status =
-        mhi_parameters_create(setup->parameters, setup->system, &ocp->arena, &ocp->parameters, err);
-    ocp->face.n_p = setup->parameters->n;
-    ocp->face.p_lower = ocp->parameters.lower;
-    ocp->face.p_upper = ocp->parameters.upper;
-    ocp->face.set_parameters = mhi_ocp_set_parameters;
-    return status;
-}
-
 static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     mhi_work_begin(&ocp->work, 0, 0);
     const mhe_system *f = mhi_system_face(setup->system);
@@ -397,7 +312,7 @@ static mhe_status build(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err
     ocp->face.n_x = f->n_x + ocp->signals.n_carried; /* as the terms ask */
     tell_low_rank(ocp, f);
     if (status == MHE_OK) {
-        status = set_calibration(ocp, setup, err);
+        status = mhi_ocp_set_calibration(ocp, setup, err);
     }
     if (status == MHE_OK) {
         status = take_arrays(ocp, err);

@@ -74,6 +74,11 @@ mhe_status mhi_ocp_evaluate(const mhe_stage_problem *problem, int32_t worker, in
 mhe_status mhi_ocp_set_parameters(const mhe_stage_problem *problem, const double *p,
                                   mhe_error *err);
 
+/* ocp_calibration.c: what is estimated; MHE_E_CONFIG: a cost that has no place there. */
+mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err);
+/* A worker's, for the parameters. */
+mhe_status mhi_ocp_take_parameter_room(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err);
+
 /* joint_signals.c. Row of the signal `name`, MHI_REACTION and a joint: it is there from now on; -1:
  * refused, for what ocp->no_signal says. */
 int32_t mhi_ocp_open_joint(mhi_ocp *ocp, const char *name);
