@@ -17,6 +17,9 @@
 
 #define L KALMAN_LANES
 #define LEAST_PIVOT 1e-12
+#define MANY 5 /* changes, or systems before, after which there are more as a rule: */
+#define SOME 2
+#define EARLIER 2          /* stages before the first change in which the next may be, as a rule */
 #define LEAST_FREEDOM 1e-6 /* of what its cost alone would leave a control */
 
 /* ---- memory ---- */
@@ -169,6 +172,45 @@ static int32_t find_changes(const qp *q, changes *c) {
     return 1;
 }
 
+/* ---- what may change next ---- */
+
+/* How far a control is from a change, in its own unit: to its nearer bound, or what its cost alone
+ * would move it by if it were let go. */
+static inline double to_change(const qp *q, ptrdiff_t at, const double *bend) {
+    return q->side[at] == 0 ? smaller(q->w[at] - q->lower[at], q->upper[at] - q->w[at])
+                            : fabs(q->slope[at]) / *bend;
+}
+
+/* Lanes of a group that are left over take the controls that are nearest to a change: the systems
+ * after this one then find their answers there. Where all states are dense an answer costs the
+ * more the earlier it begins. `list` [n < 8] grows; its length. */
+static int32_t add_likely(const qp *q, int32_t n, ptrdiff_t *list) {
+    const qp_shape *s = q->shape;
+    const double *side = q->update.side;
+    const int32_t first = (int32_t)(list[0] / s->ld_z) - EARLIER; /* they are in order */
+    double distance[L];
+    int32_t to = n;
+    for (int32_t k = q->kalman.m > 0 || first < 0 ? 0 : first; k < s->N; k++) {
+        const double *H = q->stages[k].H;
+        for (int32_t i = 0; i < s->n_u; i++) {
+            const ptrdiff_t at = (ptrdiff_t)k * s->ld_z + i;
+            const double far = to_change(q, at, H + (ptrdiff_t)i * (s->ld_z + 1));
+            if ((to == L && !(far < distance[L - 1])) || q->fixed[at] || q->side[at] != side[at] ||
+                !(far >= 0) || answer_to(&q->update, at) >= 0) {
+                continue;
+            }
+            int32_t place = to < L ? to++ : L - 1;
+            for (; place > n && far < distance[place - 1]; place--) {
+                distance[place] = distance[place - 1];
+                list[place] = list[place - 1];
+            }
+            distance[place] = far;
+            list[place] = at;
+        }
+    }
+    return to;
+}
+
 /* 0: there is no more room, or factors cost less. */
 static int32_t find_new_answers(qp *q, const changes *c) {
     int32_t group = 0;
@@ -179,8 +221,12 @@ static int32_t find_new_answers(qp *q, const changes *c) {
     if (c->n_new > L * (left < at_once ? left : at_once)) {
         return 0;
     }
+    const int32_t more = c->n >= MANY || q->iterations >= SOME;
     for (int32_t i = 0; i < c->n_new; i += L) {
-        find_answers(q, c->n_new - i < L ? c->n_new - i : L, c->new + i, group + i / L);
+        ptrdiff_t list[L];
+        const int32_t n = c->n_new - i < L ? c->n_new - i : L;
+        memcpy(list, c->new + i, sizeof *list * (size_t)n);
+        find_answers(q, more && n < L ? add_likely(q, n, list) : n, list, group + i / L);
     }
     return 1;
 }

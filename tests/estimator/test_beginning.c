@@ -8,6 +8,7 @@
 #include "support.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define NEAR 0.01 /* rad, of the reference, at the end */
@@ -133,21 +134,22 @@ static void by_work(void **state) {
     }
 }
 
-/* Markers anywhere use up all that a beginning may take; what is right afterwards is found. Not
- * from every posture that they led to: of 30 draws 5 or 6 stay at another optimum. */
+/* Markers anywhere use up all that a beginning may take; what is right afterwards is found, from
+ * whatever they led to. These draws are the ones of the first thirty after which a beginning once
+ * rested for good; MHE_DRAWS: so many others. */
 static void after_what_was_wrong(void **state) {
     (void)state;
+    static const uint64_t draws[] = {1, 5, 10, 15, 19, 20, 23, 25};
+    const char *more = getenv("MHE_DRAWS");
+    const int n = more != NULL ? atoi(more) : (int)(sizeof draws / sizeof draws[0]);
     for (int s = 0; s < 2; s++) {
-        int32_t found = 0;
-        for (uint64_t seed = 1; seed <= 4; seed++) {
-            run_of o = {.first = 1, .wrong = 60, .seed = seed};
+        for (int i = 0; i < n; i++) {
+            run_of o = {.first = 1, .wrong = 60, .seed = more != NULL ? (uint64_t)i + 1 : draws[i]};
             run(presets[s], &o);
-            print_message("%s, wrong for 60 frames: angles %.2g rad off at the end\n", presets[s],
-                          o.off);
-            assert_true(isfinite(o.off));
-            found += o.off <= NEAR;
+            print_message("%s, draw %d, wrong for 60 frames: angles %.2g rad off at the end\n",
+                          presets[s], (int)o.seed, o.off);
+            assert_true(o.off <= NEAR);
         }
-        assert_true(found >= 2);
     }
 }
 

@@ -21,12 +21,13 @@
  * recordings take a third of it, as a rule. Where the integrator needs more than PLAIN for an
  * interval (finer steps, states of muscles) it is more, up to DEARER times. What is not found by
  * then the frames behind it go on looking for, in slices of what there is for LATER; when that is
- * used up, too, the beginning rests: each frame gives back a little, and when WAKE is there the
- * window begins anew from its measurements. So a beginning that takes long takes several frames, a
- * recording that goes wrong at first is not lost, and one that is wrong costs little. Where muscles
- * have states of their own (tendons, whose lengths nothing measures) all of it is STATES times as
- * much: their first windows take up to four times the iterations. A settled window whose usual
- * frame is not known yet may take LEAST in any case. All of them are parts of the first. */
+ * used up, too, the beginning rests: each frame takes one look and gives back a little, and when
+ * WAKE is there (after 133 frames at most) the window begins anew from its measurements. So a
+ * beginning that takes long takes several frames, a recording that goes wrong at first is not lost,
+ * and one that is wrong costs little. Where muscles have states of their own (tendons, whose
+ * lengths nothing measures) all of it is STATES times as much: their first windows take up to four
+ * times the iterations. A settled window whose usual frame is not known yet may take LEAST in any
+ * case. All of them are parts of the first. */
 #define FIRST 12000.0
 #define PLAIN 40.0
 #define DEARER 4.0
@@ -216,7 +217,7 @@ static void learn(mhi_pace *p, double work) {
 static void spend(mhe_estimator *e, double work) {
     mhi_pace *p = &e->pace;
     p->later =
-        fmax(p->later - fmax(work - p->first, 0), 0) + (p->rests ? REFILL * p->all_first : 0);
+        p->rests ? p->later + REFILL * p->all_first : fmax(p->later - fmax(work - p->first, 0), 0);
     p->first = fmax(p->first - work, 0);
     if (p->first == 0 && p->later < SLICE * p->all_first && !mhi_phase_settled(e)) {
         p->rests = 1;
