@@ -110,6 +110,7 @@ static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, cons
                         const course_stop *b, route_work *work, wrap_string *string) {
     const double *tried = work->tried + 6 * w;
     const wrap_string *last = before > 0 ? &work->strings[w] : NULL;
+    const wrap_string *guess = work->afresh ? NULL : last;
     if (last != NULL && memcmp(tried, a->at, sizeof a->at) == 0 &&
         memcmp(tried + 3, b->at, sizeof b->at) == 0) {
         *string = *last;
@@ -123,14 +124,14 @@ static int32_t wrap_try(const path_route *route, int32_t w, int32_t before, cons
         int pushed = a->wrap >= 0 && string_clears(route, w, work, ends[0]);
         pushed |= b->wrap >= 0 && string_clears(route, w, work, ends[1]);
         work->pushed |= pushed;
-        return string_between(route, w, ends[0], ends[1], last, work, string);
+        return string_between(route, w, ends[0], ends[1], guess, work, string);
     }
     double *hopeless = work->hopeless + 6 * w;
     if (last == NULL && memcmp(hopeless, a->at, sizeof a->at) == 0 &&
         memcmp(hopeless + 3, b->at, sizeof b->at) == 0) {
         return WRAP_UNSOLVED;
     }
-    int32_t state = string_between(route, w, a->at, b->at, last, work, string);
+    int32_t state = string_between(route, w, a->at, b->at, guess, work, string);
     if (state == WRAP_UNSOLVED) { /* which takes longest to find out */
         memcpy(hopeless, a->at, sizeof a->at);
         memcpy(hopeless + 3, b->at, sizeof b->at);
@@ -326,8 +327,11 @@ void course_drop(const path_route *route, int32_t w, route_work *work) {
     work->state[w] = WRAP_NONE;
     for (int32_t k = 0; k < route->n_wraps; k++) {
         work->blocker[k] = -1;
+        work->tried[6 * k] = NAN; /* the strings are those of the row */
     }
+    work->afresh = 1;
     wraps_insert(route, work);
+    work->afresh = 0;
     pieces_make(route, work);
     strings_renew(route, work);
 }

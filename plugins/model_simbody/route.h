@@ -96,6 +96,7 @@ typedef struct route_work {
     uint8_t *without;         /* [n_wraps]: 1: that one is left out */
     uint8_t *out;             /* [n_wraps]: 1: of all courses; see release.c */
     uint8_t *whole;           /* [n_wraps]: 1: it does not let go of a point; see release.c */
+    int32_t afresh;           /* 1: strings are looked for without a guess */
     int32_t deepest;          /* 1: single strings let go of points, as where there is one */
     int32_t *blocker;         /* [n_wraps]: whose string ends inside the obstacle; -1: none */
     int32_t lost;             /* the last wrap that held no string in a row; -1: none */
