@@ -251,6 +251,36 @@ static void estimates_are_the_same_without(void **state) {
     free(without);
 }
 
+/* Costs of the node before make states of signals, more than a window has causes; with next to no
+ * weight they change nothing. (The arrays of the way to the last node were too small for them.) */
+static void costs_of_the_node_before(void **state) {
+    (void)state;
+    static const char *const rates =
+        "costs: [mhe.cost.emg-markers, {plugin: mhe.cost.rate, signal: markers, weight: 1e-9},\n"
+        "  {plugin: mhe.cost.rate, signal: muscle_force, weight: 1e-15},\n"
+        "  {plugin: mhe.cost.rate, signal: excitation, weight: 1e-9}]\n";
+    static const char plain[] = "costs: [mhe.cost.emg-markers]\n";
+    static series without, with;
+    char yaml[2048], causes[512], more[3072];
+    write_causes(causes, sizeof causes, "emg_noise", 0.1);
+    config(yaml, sizeof yaml, "excitation", "last", causes);
+    run(yaml, &none, 1, &without);
+    const char *at = strstr(yaml, plain);
+    assert_non_null(at);
+    (void)snprintf(more, sizeof more, "%.*s%s%s", (int)(at - yaml), yaml, rates,
+                   at + strlen(plain));
+    run(more, &none, 1, &with);
+    assert_int_equal(with.n, without.n);
+    double off = 0, most = 0;
+    for (int32_t k = 0; k < with.n; k++) {
+        for (int32_t i = 0; i < N_Q; i++) {
+            off = fmax(off, fabs(with.at[k][i] - without.at[k][i]));
+            most = fmax(most, without.at[k][i]);
+        }
+    }
+    assert_true(most > 0 && off < 1e-3 * most);
+}
+
 static void elastic_tendons_have_none(void **state) {
     (void)state;
     test_fixture f;
@@ -269,6 +299,7 @@ int main(void) {
         cmocka_unit_test(markers_are_answered_as_the_estimator_does),
         cmocka_unit_test(strength_is_answered_as_the_estimator_does),
         cmocka_unit_test(estimates_are_the_same_without),
+        cmocka_unit_test(costs_of_the_node_before),
         cmocka_unit_test(elastic_tendons_have_none),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

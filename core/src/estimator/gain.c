@@ -21,6 +21,8 @@ mhe_status mhi_gain_create(mhi_gain *g, mhi_arena *arena, mhe_error *err) {
     g->n_window = g->fresh + g->horizon * n_q;
     g->n_columns = g->n_window + g->horizon * n_q;
     const int32_t n_w = g->n_window;
+    /* States that costs carry on from node to node may be more than columns. */
+    const int32_t most = n_x > n_u ? n_x : n_u, widest = n_w > most ? n_w : most;
     const mhi_room rooms[] = {{&g->here.A, n_x * n_x},
                               {&g->here.B, n_x * n_u},
                               {&g->here.hess_xx, n_x * n_x},
@@ -53,7 +55,7 @@ mhe_status mhi_gain_create(mhi_gain *g, mhi_arena *arena, mhe_error *err) {
                               {&g->M, n_u * n_u},
                               {&g->BT, n_u * n_w},
                               {&g->closed, n_x * n_x},
-                              {&g->more, n_x * n_w}};
+                              {&g->more, n_x * widest}};
     return MHI_TAKE_ROOMS(arena, rooms, err);
 }
 
