@@ -160,6 +160,12 @@ function draw() {
   }
   if (!recorded && !everything) { spent = begun; bell.port2.postMessage(1); }
 }
+// All there is, in sight or not: for paper.
+function drawAll() {
+  if (!anything) return;
+  figure(); for (const id of since.keys()) charts[id]();
+  sayNumber(); showNumber(); showMuscles();
+}
 let spent = 0;
 bell.port1.onmessage = e => e.data ? measure(spent) : draw();
 // What a picture cost this thread, the browser's own work on it included, decides how many there are.

@@ -9,8 +9,11 @@ function numbers(base64) {
 const section = (name, ...content) => { const s = document.createElement("section"); s.className = "past " + name; s.append(...content); return s; };
 function heading(text) { const h = document.createElement("h2"); h.textContent = text; return h; }
 
-// A picture: its name, what it spans, and lines; drawn when it comes into sight.
-const seenOnce = new IntersectionObserver(list => list.forEach(e => { if (e.isIntersecting) { seenOnce.unobserve(e.target); e.target.show(); } }), { rootMargin: "300px" });
+// A picture: its name, what it spans, and lines; drawn when it comes into sight, or onto paper.
+const unseen = new Set();
+const drawOnce = box => { if (unseen.delete(box)) { seenOnce.unobserve(box); box.show(); } };
+const seenOnce = new IntersectionObserver(list => list.forEach(e => { if (e.isIntersecting) drawOnce(e.target); }), { rootMargin: "300px" });
+addEventListener("beforeprint", () => { unseen.forEach(drawOnce); drawAll(); });
 function picture(p, group, times, pick) {
   const box = document.createElement("div"), figure = document.createElement("figure"), caption = document.createElement("figcaption"), small = document.createElement("small");
   small.textContent = ` ${+p.range[0].toPrecision(3)} to ${+p.range[1].toPrecision(3)} ${group.unit}`;
@@ -28,7 +31,7 @@ function picture(p, group, times, pick) {
     for (const [kind, time, values] of p.lines) if (kinds[kind]) lines.push({ ...kinds[kind], x: times[time], y: numbers(values) });
     drawStill(box, lines, o);
   };
-  seenOnce.observe(box);
+  unseen.add(box); seenOnce.observe(box);
   return figure;
 }
 
