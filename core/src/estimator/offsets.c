@@ -9,6 +9,9 @@
 /* What a look is off by, of the offset expected, before the looks themselves tell: as much as a
  * marker's worth of them says. */
 #define FIRST_NOISE 0.1
+/* Looks follow each other within tenths of a second, in which skin is moved alike: so many say as
+ * much as one. */
+#define ALIKE 10
 /* A posture is looked at that is as far from the last one looked at, rad or m. */
 #define NEWS 0.05
 /* A look's posture does not move by more at once, rad or m. */
@@ -295,7 +298,7 @@ static double noise(const mhi_offsets *o) {
         squares += o->value[i] * (row - 2 * o->right[i]);
     }
     const double over = fmax(0, o->rows - o->n_q * o->n_looks - o->n);
-    return (o->n * first * first + fmax(0, squares)) / (o->n + over);
+    return (o->n * first * first + ALIKE * fmax(0, squares)) / (o->n + over);
 }
 
 /* A step towards the offsets that are likeliest, with their change. */
