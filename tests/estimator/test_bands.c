@@ -20,6 +20,9 @@
 enum { OF_Q, OF_ACTIVATION, OF_FORCE, OF_MOMENT, N_KINDS };
 static const int32_t width[N_KINDS] = {N_Q, N_M, N_M, N_Q};
 
+/* What a band is of its deviation where the truth can be on one side alone (bounds, EMG). */
+#define ONE_SIDE (1.645 / 1.96)
+
 /* Of the estimates from FIRST on: values, or standard deviations, kind by kind. */
 typedef struct series {
     int32_t n;
@@ -141,7 +144,8 @@ static void pool(const series *sd, const series *sum, outcome *out) {
                 const double given = sd->at[k][first + (size_t)j];
                 out->sd[kind] += given * given;
                 out->faults[kind] += by_faults * by_faults;
-                out->difference[kind] += (given - by_faults) * (given - by_faults);
+                const double d = fmin(fabs(given - by_faults), fabs(given - ONE_SIDE * by_faults));
+                out->difference[kind] += d * d;
             }
         }
         first += (size_t)width[kind];
@@ -188,7 +192,7 @@ static outcome compare(const char *formulation, const char *node, const char *ca
 }
 
 static fault of_emg(int32_t i) {
-    return (fault){i, -1, 1e-4, 0, 0};
+    return (fault){i, -1, 3e-4, 0, 0};
 }
 
 static fault of_marker(int32_t i) {
@@ -206,7 +210,7 @@ static void emg_is_answered_as_the_estimator_does(void **state) {
     static const char *const cases[][2] = {
         {"excitation", "first"}, {"activation", "first"}, {"excitation", "last"}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
-        const outcome o = compare(cases[i][0], cases[i][1], "emg_floor", 0.01, N_M, of_emg);
+        const outcome o = compare(cases[i][0], cases[i][1], "emg_floor", 0.03, N_M, of_emg);
         if (!(o.difference[OF_ACTIVATION] < 0.1 && o.difference[OF_FORCE] < 0.1 &&
               o.sd[OF_MOMENT] > 0.8 * o.faults[OF_MOMENT])) {
             fail_msg("%s, %s: %g %g, moment %g of %g", cases[i][0], cases[i][1],

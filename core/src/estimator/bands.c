@@ -7,17 +7,11 @@ static mhe_status create_variants(mhe_estimator *e, mhi_bands *b, mhe_error *err
     const mhi_uncertainty_section *c = b->config;
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < MHI_N_VARIANTS && status == MHE_OK; i++) {
-        const double way = i % 2 == 0 ? 1 : -1;
-        const int32_t of_tendon = i >= 2;
-        /* A path that is longer is a tendon that is shorter. */
-        mhi_variation by = {1, 1, 1, 0};
-        if (of_tendon) {
-            by.tendon += way * c->tendon_slack_length;
-            by.path = way * c->path_length;
-        } else {
-            by.fiber += way * c->optimal_fiber_length;
-        }
-        if (by.tendon != 1 || by.fiber != 1 || by.path != 0) {
+        const mhi_variation by = {.fiber = c->optimal_fiber_length,
+                                  .tendon = c->tendon_slack_length,
+                                  .path = c->path_length,
+                                  .far = i == 0 ? MHI_FAR : -MHI_FAR};
+        if (by.fiber > 0 || by.tendon > 0 || by.path > 0) {
             status = mhi_variant_create(e->system, &by, &b->variants[i], err);
         }
     }
@@ -29,15 +23,20 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
     const mhi_room rooms[] = {{&b->error, b->n_x * n},
                               {&b->next, b->n_x * n},
                               {&b->size, n},
+                              {&b->free, b->n_m},
                               {&b->noise_share, b->n_m},
-                              {&b->skew, n},
+                              {&b->far, n},
+                              {&b->near, n},
+                              {&b->below, b->n_m},
+                              {&b->above, b->n_m},
                               {&b->at, b->n_x * n},
                               {&b->controls, b->n_u * n},
                               {&b->row, n},
                               {&b->marker_q, 3 * e->n_k * b->n_q},
                               {&b->marker, 3 * e->n_k},
                               {&b->force, b->n_m},
-                              {&b->worst, b->n_m},
+                              {&b->more, b->n_m},
+                              {&b->less, b->n_m},
                               {&b->force_error, b->n_m * n},
                               {&b->q, b->n_q},
                               {&b->activation, b->n_m},
@@ -106,6 +105,9 @@ mhe_status mhi_bands_create(mhe_estimator *e, mhi_bands **bands, mhe_error *err)
         mhi_bands_free(b);
         return status;
     }
+    for (int32_t m = 0; m < b->n_m; m++) {
+        b->free[m] = 1;
+    }
     *bands = b;
     return MHE_OK;
 }
@@ -170,18 +172,42 @@ static void move_on(mhi_bands *b) {
     b->next = swap;
 }
 
-/* Standard deviation of a sum of independent causes, such that 1.96 of it hold 95 %. A cause with a
- * long tail reaches further than its deviation says, but the skewness of a sum falls with the
+/* A sum of independent causes: its standard deviation, and how much further than that it reaches on
+ * the side of its long tail and less on the other, shares. The skewness of a sum falls with the
  * number of its causes, as its cubes say (the first term of Cornish and Fisher 1938,
  * doi:10.2307/1400905). */
-static double reach_of(const mhi_bands *b, const double *row) {
-    double squares = 0, cubes = 0;
+typedef struct sum {
+    double sd, far, near;
+    int32_t above; /* the long tail is that of truths above the estimate */
+} sum;
+
+static sum sum_of(const mhi_bands *b, const double *row) {
+    double squares = 0, far = 0, near = 0;
     for (int32_t i = 0; i < b->gain.n_columns; i++) {
-        const double square = row[i] * row[i];
+        const double square = row[i] * row[i], cube = square * row[i];
         squares += square;
-        cubes += b->skew[i] * square * row[i];
+        far += b->far[i] * cube;
+        near += b->near[i] * cube;
     }
-    return squares > 0 ? sqrt(squares) + fabs(cubes) / squares : 0;
+    const double sd = sqrt(squares), unit = squares > 0 ? 1 / (squares * sd) : 0;
+    return (sum){sd, fabs(far) * unit, fmin(1, fabs(near) * unit), near > 0};
+}
+
+/* Such that 1.96 of it hold 95 % on either side, by the side that reaches further. */
+static double reach_of(const mhi_bands *b, const double *row) {
+    const sum s = sum_of(b, row);
+    return s.sd * (1 + s.far);
+}
+
+/* The same of a number whose truth is no more than `below` and `above` off. Where one side is held
+ * whole, all of the 5 % may lie on the other. */
+static double reach_within(const mhi_bands *b, const double *row, double below, double above) {
+    const sum s = sum_of(b, row);
+    const double far = s.sd * (1 + s.far), near = s.sd * (1 - s.near);
+    const double up = s.above ? far : near; /* truth above the estimate */
+    const double down = s.above ? near : far;
+    return fmin(far, fmin(fmax(ONE_SIDED * down, above / TWO_SIDED),
+                          fmax(ONE_SIDED * up, below / TWO_SIDED)));
 }
 
 /* The row of activations of the output's node: states, or controls. */
@@ -217,6 +243,16 @@ static void measure_moments(mhi_bands *b) {
     }
 }
 
+/* The row of a muscle's activation as it is while its control is between its bounds: what they
+ * leave now says reach_within(). Only the error of its own force it makes good as bounds let it. */
+static void let_go(const mhi_bands *b, int32_t m, double *row) {
+    const double own = row[b->n_m + m], more = 1 / b->gain.known.free[m];
+    for (int32_t i = 0; i < b->gain.n_columns; i++) {
+        row[i] *= more;
+    }
+    row[b->n_m + m] = own;
+}
+
 /* Standard deviations from the errors of the output's node, in b->at and b->controls. */
 static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state *muscles) {
     const int32_t n = b->gain.n_columns, n_q = b->n_q;
@@ -225,14 +261,16 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
     }
     for (int32_t m = 0; m < b->n_m; m++) { /* of the activation, and of the muscle's numbers */
         double *row = b->force_error + m * n;
-        const double *a = activation_row(e, b, m);
-        b->activation[m] = reach_of(b, a);
-        memcpy(row, a, sizeof(double) * (size_t)n);
+        memcpy(row, activation_row(e, b, m), sizeof(double) * (size_t)n);
         row[b->n_m + m] += b->size[b->n_m + m];
     }
     measure_moments(b);
     for (int32_t m = 0; m < b->n_m; m++) {
         double *row = b->force_error + m * n;
+        memcpy(row, activation_row(e, b, m), sizeof(double) * (size_t)n);
+        let_go(b, m, row);
+        b->activation[m] = reach_within(b, row, b->below[m], b->above[m]);
+        row[b->n_m + m] += b->size[b->n_m + m];
         for (int32_t i = 0; i < n; i++) {
             row[i] *= muscles->force_a[m];
         }
@@ -240,7 +278,10 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
             add(row, b->at + i * n, muscles->force_q[m * n_q + i], n);
             add(row, b->at + (n_q + i) * n, muscles->force_v[m * n_q + i], n);
         }
-        b->force_sd[m] = reach_of(b, row);
+        const double number = SURE * b->size[b->n_m + m] * muscles->force_a[m];
+        b->force_sd[m] = reach_within(
+            b, row, fmin(b->below[m] * muscles->force_a[m] + number, fmax(0, muscles->force[m])),
+            b->above[m] * muscles->force_a[m] + number * (1 + b->far[b->n_m + m]));
     }
 }
 
@@ -326,6 +367,7 @@ void mhi_bands_give(mhe_estimator *e, int32_t k, mhe_estimate *out) {
     if (k > 0) {
         spread(b, b->n_u, known->K, known->ff, b->controls);
     }
+    mhi_bands_free_controls(e, b);
     mhi_bands_learn(e, b);
     move_on(b);
 }

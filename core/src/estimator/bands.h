@@ -5,8 +5,9 @@
  * order its error is one too, driven by what estimates rest on (gain.h): its columns, each by one
  * standard deviation of its cause, are carried from window to window. Causes are independent of
  * each other; the errors of EMG, muscles and marker offsets are the same at all nodes of a window
- * and follow the motion, a marker's noise is fresh at every node. Bounds count as not active, which
- * is on the safe side: what is cut off at a bound is nearer to the truth than what is not. */
+ * and follow the motion, a marker's noise is fresh at every node. A control that is at a bound
+ * for a part of the time answers less, so that postures have to give way, and what bounds and EMG
+ * leave no room for is not in a band (bands_private.h). */
 #ifndef MHI_BANDS_H
 #define MHI_BANDS_H
 

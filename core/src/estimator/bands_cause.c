@@ -8,8 +8,13 @@
 
 #define MEMORY 500.0  /* frames that the level of EMG's noise is learnt over */
 #define PATIENCE 10.0 /* frames' worth of belief in what the config says of it */
-#define QUIET 0.02    /* channels that vary less than that tell little */
-#define UNKNOWN 0.1   /* variation of a channel that is not known yet */
+/* The noise of a channel is known by few waves of it and by what all channels show: its band is
+ * that of Student's t with 12 degrees of freedom. */
+#define FEW (2.179 / 1.96)
+#define CYCLE 60.0     /* frames over which what bounds hold is taken together */
+#define LEAST_FREE 0.4 /* of what a control answers */
+#define QUIET 0.02     /* channels that vary less than that tell little */
+#define UNKNOWN 0.1    /* variation of a channel that is not known yet */
 
 /* Next state by an error of a muscle's force that stays over the interval, in units of activation:
  * as if activation and its control were that much larger together. */
@@ -121,6 +126,7 @@ int32_t mhi_bands_expand(mhe_estimator *e, mhi_bands *b) {
     b->gain.interval = mhi_ocp_problem(e->ocp)->interval;
     forces_of(e, b);
     postures_of(e, b, k);
+    memcpy(here->free, b->free, sizeof(double) * (size_t)b->n_m);
     for (int32_t m = 0; m < b->n_m; m++) { /* what holds a control is its EMG */
         here->control[m] = -here->hess_uu[m * b->n_u + m];
     }
@@ -145,12 +151,21 @@ static double variation_of(const double *spread, int32_t m) {
 
 /* A share by which a number may be off is one of the true number; what is at hand is already off,
  * and where it is too small the truth is more than that share above it. Of e normal with deviation
- * sd, e / (1 + e) has 95 % of its values below what one sided quantiles of e make of it: so much
- * further than sd it reaches, a share. */
-static double tail_of(double sd) {
-    const double one_sided = 1.645, two_sided = 1.96;
-    const double low = fmin(one_sided * sd, 0.8);
-    return fmax(0, one_sided / two_sided / (1 - low) - 1);
+ * sd that is e / (1 + e), whose mean square is sd^2 (1 + 9 sd^2 + 75 sd^4) to sixth order. */
+static double share_of(double sd) {
+    const double square = sd * sd;
+    return sd * sqrt(1 + square * (9 + 75 * square));
+}
+
+/* Where it is alone its 95 % end where those of e do: further than its deviation where the truth is
+ * above, less far below. */
+static double far_of(double sd) {
+    const double low = fmin(1.645 * sd, 0.8);
+    return sd > 0 ? fmax(0, sd * ONE_SIDED / (1 - low) / share_of(sd) - 1) : 0;
+}
+
+static double near_of(double sd) {
+    return sd > 0 ? 1 - sd / (1 + TWO_SIDED * sd) / share_of(sd) : 0;
 }
 
 /* A part of a cause with its tail, as a share of the whole: third moments add up. */
@@ -158,62 +173,111 @@ static double skew_of(double part, double tail, double all) {
     return all > 0 ? tail * pow(part / all, 1.5) : 0;
 }
 
-static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k) {
+/* What EMG and bounds leave for the truth: a control is nearly surely within SURE standard
+ * deviations of its EMG, whatever the other muscles are asked to do. */
+static void limit_activation(const mhe_estimator *e, mhi_bands *b, int32_t k, int32_t m, double emg,
+                             double activation) {
+    const double u = mhi_row(e->window.solution.u, k, b->n_u)[m];
+    const double least = mhi_ocp_u_lower(e->ocp, k)[m], most = mhi_ocp_u_upper(e->ocp, k)[m];
+    b->below[m] = fmax(0, activation - least);
+    b->above[m] = fmax(0, most - activation);
+    if (!isnan(emg)) {
+        const double off = SURE * b->size[m];
+        b->below[m] = fmin(b->below[m], fmax(0, u - emg + off));
+        b->above[m] = fmin(b->above[m], fmax(0, emg - u + off * (1 + b->far[m])));
+    }
+}
+
+static void size_emg(mhe_estimator *e, mhi_bands *b, int32_t k, const double *activation) {
     const mhi_uncertainty_section *c = b->config;
-    const double *emg = emg_of(e, k < e->window.n ? k : e->window.n - 1);
+    const int32_t node = k < e->window.n ? k : e->window.n - 1;
+    const double *emg = emg_of(e, node);
     const double *spread = varied_of(e);
     for (int32_t m = 0; m < b->n_m; m++) {
         const int32_t known = emg != NULL && !isnan(emg[m]);
-        const double noise = b->emg.level * c->emg_noise * variation_of(spread, m);
-        const double gain = known ? c->emg_gain * emg[m] : 0;
+        const double noise = FEW * b->emg.level * c->emg_noise * variation_of(spread, m);
+        const double gain = known ? share_of(c->emg_gain) * emg[m] : 0;
         const double all = known ? noise * noise + gain * gain + c->emg_floor * c->emg_floor
                                  : c->control * c->control;
         b->size[m] = sqrt(all);
         b->noise_share[m] = known && all > 0 ? noise * noise / all : 0;
-        b->skew[m] = known ? skew_of(gain * gain, tail_of(c->emg_gain), all) : 0;
+        b->far[m] = known ? skew_of(gain * gain, far_of(c->emg_gain), all) : 0;
+        b->near[m] = known ? skew_of(gain * gain, near_of(c->emg_gain), all) : 0;
+        limit_activation(e, b, node, m, known ? emg[m] : NAN, activation[m]);
     }
 }
 
-/* A muscle's force errors by its numbers, as one: they act through the force alone. */
+/* How far forces are above and below those at hand with other lengths: b->more, b->less. */
+static void vary_lengths(mhi_bands *b, const double *activation, const mhi_muscle_state *muscles) {
+    memset(b->more, 0, sizeof(double) * (size_t)b->n_m);
+    memset(b->less, 0, sizeof(double) * (size_t)b->n_m);
+    for (int32_t i = 0; i < MHI_N_VARIANTS; i++) {
+        if (b->variants[i] == NULL ||
+            mhi_variant_forces(b->variants[i], activation, muscles->length, muscles->velocity,
+                               b->force, NULL) != MHE_OK) {
+            continue;
+        }
+        for (int32_t m = 0; m < b->n_m; m++) {
+            const double d = b->force[m] - muscles->force[m];
+            b->more[m] = isfinite(d) ? fmax(d, b->more[m]) : b->more[m];
+            b->less[m] = isfinite(d) ? fmax(-d, b->less[m]) : b->less[m];
+        }
+    }
+}
+
+/* A muscle's force errors by its numbers, as one: they act through the force alone. The two ways of
+ * a length are 1 + tail and 1 - 2 tail of its deviation. */
 static void size_forces(mhe_estimator *e, mhi_bands *b, const double *activation,
                         const mhi_muscle_state *muscles) {
-    double *size = b->size + b->n_m, *skew = b->skew + b->n_m;
     const double off = b->config->max_isometric_force;
-    for (int32_t m = 0; m < b->n_m; m++) {
-        size[m] = off * muscles->force[m] * off * muscles->force[m];
-        skew[m] = size[m]; /* the part with a tail, until all are there */
-    }
-    for (int32_t i = 0; i < MHI_N_VARIANTS; i += 2) {
-        memset(b->worst, 0, sizeof(double) * (size_t)b->n_m);
-        for (int32_t way = i; way < i + 2; way++) {
-            if (b->variants[way] == NULL ||
-                mhi_variant_forces(b->variants[way], activation, muscles->length, muscles->velocity,
-                                   b->force, NULL) != MHE_OK) {
-                continue;
-            }
-            for (int32_t m = 0; m < b->n_m; m++) {
-                const double d = fabs(b->force[m] - muscles->force[m]);
-                b->worst[m] = isfinite(d) ? fmax(d, b->worst[m]) : b->worst[m];
-            }
-        }
-        for (int32_t m = 0; m < b->n_m; m++) { /* of both ways the larger */
-            size[m] += b->worst[m] * b->worst[m];
-        }
-    }
+    vary_lengths(b, activation, muscles);
     for (int32_t m = 0; m < b->n_m; m++) {
         const double least = 1e-3 * e->description->muscles[m].max_isometric_force;
         const double slope = fmax(fabs(muscles->force_a[m]), least);
-        skew[m] = skew_of(skew[m], tail_of(off), size[m]);
-        size[m] = sqrt(size[m]) / slope;
+        const double more = fmax(b->more[m], b->less[m]), other = fmin(b->more[m], b->less[m]);
+        const double length = (2 * more + other) / 3 / TWO_SIDED;
+        const double strength = share_of(off) * muscles->force[m];
+        const double all = length * length + strength * strength;
+        const double sign = b->more[m] > b->less[m] ? 1 : -1;
+        const double tail = more > 0 ? sign * (more - other) / (2 * more + other) : 0;
+        const double of_length = skew_of(length * length, tail, all);
+        b->size[b->n_m + m] = sqrt(all) / slope;
+        b->far[b->n_m + m] = of_length + skew_of(strength * strength, far_of(off), all);
+        b->near[b->n_m + m] = 2 * of_length + skew_of(strength * strength, near_of(off), all);
     }
 }
 
 void mhi_bands_size(mhe_estimator *e, mhi_bands *b, int32_t k, const double *activation,
                     const mhi_muscle_state *muscles) {
-    size_emg(e, b, k);
+    size_emg(e, b, k, activation);
     size_forces(e, b, activation, muscles);
     for (int32_t i = b->gain.fixed; i < b->gain.n_columns; i++) {
         b->size[i] = 1;
+    }
+}
+
+/* Probability that a normal deviate is below `x` of its standard deviations. */
+static double normal_below(double x) {
+    return 0.5 * erfc(-x * 0.70710678118654752);
+}
+
+void mhi_bands_free_controls(mhe_estimator *e, mhi_bands *b) {
+    const mhe_solution *s = &e->window.solution;
+    const double *least = mhi_ocp_u_lower(e->ocp, 0), *most = mhi_ocp_u_upper(e->ocp, 0);
+    const mhi_gain_answer *known = &b->gain.known;
+    for (int32_t m = 0; m < b->n_m; m++) {
+        const double *row = b->controls + (ptrdiff_t)m * b->gain.n_columns;
+        const double below = s->u[m] - least[m] - s->zu_lower[m] / known->weight[m];
+        const double above = most[m] - s->u[m] - s->zu_upper[m] / known->weight[m];
+        double squares = 0;
+        for (int32_t i = 0; i < b->gain.n_columns; i++) {
+            squares += row[i] * row[i];
+        }
+        const double reach = sqrt(squares) / known->free[m];
+        const double inside =
+            reach > 0 ? normal_below(below / reach) + normal_below(above / reach) - 1 : 1;
+        const double free = sqrt(fmax(0, inside));
+        b->free[m] = fmax(LEAST_FREE, b->free[m] + (free - b->free[m]) / CYCLE);
     }
 }
 
@@ -233,7 +297,7 @@ void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
             const double error = row[i] - (i == m ? b->size[m] : 0);
             const double square = error * error / (scale * scale);
             const double share = i < b->n_m ? b->noise_share[i] : 0;
-            noise += share * square / level;
+            noise += share * square / (level * FEW * FEW);
             others += (1 - share) * square;
         }
     }

@@ -32,11 +32,14 @@ mhe_status mhi_gain_create(mhi_gain *g, mhi_arena *arena, mhe_error *err) {
                               {&g->here.pose_fixed, n_q * n_q},
                               {&g->here.pose_fresh, n_q * n_q},
                               {&g->here.control, n_m},
+                              {&g->here.free, n_m},
                               {&g->known.A, n_x * n_x},
                               {&g->known.B, n_x * n_u},
                               {&g->known.force, n_x * n_m},
                               {&g->known.K, n_u * n_x},
                               {&g->known.ff, n_u * n_w},
+                              {&g->known.free, n_m},
+                              {&g->known.weight, n_m},
                               {&g->known.to_x, n_x * n_x},
                               {&g->known.to_ff, n_x * n_w},
                               {&g->known.u_x, n_u * n_x},
@@ -55,7 +58,8 @@ mhe_status mhi_gain_create(mhi_gain *g, mhi_arena *arena, mhe_error *err) {
                               {&g->M, n_u * n_u},
                               {&g->BT, n_u * n_w},
                               {&g->closed, n_x * n_x},
-                              {&g->more, n_x * widest}};
+                              {&g->more, n_x * widest},
+                              {&g->inverse, n_u * n_u}};
     return MHI_TAKE_ROOMS(arena, rooms, err);
 }
 
@@ -121,11 +125,34 @@ static void negate(double *array, ptrdiff_t n) {
     }
 }
 
+/* What a control answers less is as if it were held by more weight, beside that which holds it
+ * while all others answer. That was found by the sweep before. */
+static void hold_at_bounds(mhi_gain *g) {
+    for (int32_t m = 0; m < g->n_m && g->has_known; m++) {
+        g->M[m * g->n_u + m] += g->known.weight[m] * (1 / g->here.free[m] - 1);
+    }
+}
+
+/* 1 / (M^-1)_mm from the factor of M, without what was added to it. */
+static void weigh_controls(mhi_gain *g) {
+    const int32_t n = g->n_u;
+    set_zero(g->inverse, (ptrdiff_t)n * n);
+    for (int32_t i = 0; i < n; i++) {
+        g->inverse[i * n + i] = 1;
+    }
+    mhi_cholesky_solve(g->M, n, g->inverse, n);
+    for (int32_t m = 0; m < g->n_m; m++) {
+        const double share = g->has_known ? g->here.free[m] : 1;
+        g->known.weight[m] = share / g->inverse[m * n + m];
+    }
+}
+
 /* K = -M^-1 (S + B^T V A), ff = -M^-1 (g_u + B^T T). 0: M is singular. */
 static int32_t solve_stage(mhi_gain *g, double *K, double *ff) {
     const int32_t n_x = g->n_x, n_u = g->n_u, n_w = g->n_window;
     const mhi_matrix B = {g->here.B, n_x, n_u, n_u};
     double largest = 0;
+    hold_at_bounds(g);
     for (int32_t i = 0; i < n_u; i++) {
         largest = fmax(largest, g->M[i * n_u + i]);
     }
@@ -188,6 +215,8 @@ static int32_t go_backwards(mhi_gain *g) {
     }
     if (k > 0) {
         go_back(g, k, K);
+    } else {
+        weigh_controls(g);
     }
     g->stage--;
     return 0;
@@ -246,6 +275,7 @@ static void finish(mhi_gain *g) {
     copy(to->force, g->here.force, n_x * g->n_m);
     copy(to->K, g->K, n_u * n_x);
     copy(to->ff, g->ff, n_u * n_w);
+    copy(to->free, g->here.free, g->n_m);
     copy(to->to_x, g->to_x, n_x * n_x);
     copy(to->to_ff, g->to_ff, n_x * n_w);
     copy(to->u_x, g->u_x, n_u * n_x);

@@ -7,6 +7,9 @@
  * moment arms and weights change little in a tenth of a second. One stage is done a frame, so that
  * no frame is longer than another, and the answers are renewed every few frames.
  *
+ * A control that may come to a bound answers a share of what it would without (`free`). That is as
+ * if it had more weight of its own.
+ *
  * Columns are unit errors: of each muscle's EMG, at all nodes; of each muscle's force (in the place
  * of an error of its activation), on all intervals; of the posture that the markers show, at all
  * nodes, in n_q independent directions; and the same of single nodes, the newest first, each for
@@ -28,12 +31,15 @@ typedef struct mhi_gain_node {
     double *force;                   /* [n_x x n_m] next state by a force error */
     double *pose_fixed, *pose_fresh; /* [n_q x n_q] gradient by q of the posture's directions */
     double *control;                 /* [n_m] gradient by a muscle's control of its EMG's error */
+    double *free;                    /* [n_m] share of what a muscle's control answers, in (0, 1] */
 } mhi_gain_node;
 
 /* A sweep's result. `ff`: controls by the columns. */
 typedef struct mhi_gain_answer {
     double *A, *B, *force; /* as above */
     double *K, *ff;        /* at node 0: [n_u x n_x], [n_u x n_window] */
+    double *free;          /* as above */
+    double *weight;        /* [n_m] what holds a muscle's control while all others answer */
     double *to_x, *to_ff;  /* state of the output's node: by x_0, by columns */
     double *u_x, *u_ff;    /* its controls (of the last node those before), by the same */
 } mhi_gain_answer;
@@ -55,7 +61,7 @@ typedef struct mhi_gain {
     double *V, *T;          /* [n_x x n_x], [n_x x n_window] cost to go, its gradient */
     double *K, *ff;         /* [horizon] */
     double *to_x, *to_ff, *u_x, *u_ff;
-    double *VA, *VB, *BVA, *M, *BT, *closed, *more;
+    double *VA, *VB, *BVA, *M, *BT, *closed, *more, *inverse;
 } mhi_gain;
 
 mhe_status mhi_gain_create(mhi_gain *gain, mhi_arena *arena, mhe_error *err);

@@ -126,11 +126,13 @@ typedef struct mhi_muscle_state {
 mhe_status mhi_system_muscles(mhi_system_context *context, const mhe_system_point *at,
                               int32_t derivatives, mhi_muscle_state *out, mhe_error *err);
 
-/* The same muscles with other numbers: max_isometric_force times `force`, optimal_fiber_length
- * times `fiber`, tendon_slack_length times `tendon` plus `path` (m). Rigid tendons only.
+/* The same muscles with other lengths. Of optimal_fiber_length (`fiber`, a share of it),
+ * tendon_slack_length (`tendon`, a share) and the path's (`path`, m) these are independent standard
+ * deviations. All three act by the norm length of the fibres: they are moved together, each by its
+ * part in it, until that is `far` of its standard deviations longer. Rigid tendons only.
  * MHE_E_INPUT: the muscle plugin refuses one. [cold] */
 typedef struct mhi_variation {
-    double force, fiber, tendon, path;
+    double fiber, tendon, path, far;
 } mhi_variation;
 typedef struct mhi_variant mhi_variant;
 mhe_status mhi_variant_create(const mhi_system *system, const mhi_variation *by,

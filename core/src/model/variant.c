@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* variant.c: the forces that muscles would have if their numbers were others. */
+/* variant.c: the forces that muscles would have if their lengths were others. */
 #include "model/system_private.h"
 #include "plugin/instance.h"
 
@@ -17,10 +17,14 @@ struct mhi_variant {
 static void change(const mhi_system *s, const mhi_variation *by, mhe_muscle *muscles) {
     memcpy(muscles, s->muscles, sizeof *muscles * (size_t)s->face.n_m);
     for (int32_t m = 0; m < s->face.n_m; m++) {
-        muscles[m].max_isometric_force *= by->force;
-        muscles[m].optimal_fiber_length *= by->fiber;
-        const double slack = by->tendon * muscles[m].tendon_slack_length + by->path;
-        muscles[m].tendon_slack_length = slack < 0 ? 0 : slack;
+        double *fiber = &muscles[m].optimal_fiber_length, *slack = &muscles[m].tendon_slack_length;
+        const double of_fiber = by->fiber * *fiber;
+        const double of_tendon = isnan(*slack) ? by->path : hypot(by->tendon * *slack, by->path);
+        const double all = hypot(of_fiber, of_tendon);
+        if (all > 0) {
+            *fiber -= by->far * of_fiber * of_fiber / all;
+            *slack = fmax(0, *slack - by->far * of_tendon * of_tendon / all);
+        }
     }
 }
 
