@@ -18,38 +18,38 @@ const char *test_data_path(char *out, size_t size, const char *file) {
     return n > 0 && (size_t)n < size && access(out, R_OK) == 0 ? out : NULL;
 }
 
-#define MOST_FOLDERS 256
-static char folders[MOST_FOLDERS][256];
-static int n_folders;
-static pid_t owner; /* a child that ends leaves the folders alone */
+static char root[256]; /* of all folders of this process; empty: none yet */
+static pid_t owner;    /* a child that ends leaves it alone */
 
 static int remove_one(const char *path, const struct stat *about, int kind, struct FTW *walk) {
     (void)about, (void)kind, (void)walk;
     return remove(path);
 }
 
-static void remove_folders(void) {
-    for (int i = 0; i < n_folders && getpid() == owner; i++) {
-        (void)nftw(folders[i], remove_one, 8, FTW_DEPTH | FTW_PHYS);
+static void remove_root(void) {
+    if (getpid() == owner) {
+        (void)nftw(root, remove_one, 8, FTW_DEPTH | FTW_PHYS);
     }
 }
 
-const char *test_folder(char *out, size_t size) {
+static int make_root(void) {
     const char *below = getenv("TMPDIR") != NULL ? getenv("TMPDIR") : "/tmp";
-    if (n_folders == MOST_FOLDERS) {
+    const int n = snprintf(root, sizeof root, "%s/mhe-test-XXXXXX", below);
+    if (n < 0 || (size_t)n >= sizeof root || mkdtemp(root) == NULL) {
+        root[0] = '\0';
+        return -1;
+    }
+    owner = getpid();
+    (void)atexit(remove_root);
+    return 0;
+}
+
+const char *test_folder(char *out, size_t size) {
+    if (root[0] == '\0' && make_root() != 0) {
         return NULL;
     }
-    char *made = folders[n_folders];
-    const int n = snprintf(made, sizeof folders[0], "%s/mhe-test-XXXXXX", below);
-    if (n < 0 || (size_t)n >= sizeof folders[0] || (size_t)n >= size || mkdtemp(made) == NULL) {
-        return NULL;
-    }
-    if (n_folders++ == 0) {
-        owner = getpid();
-        (void)atexit(remove_folders);
-    }
-    memcpy(out, made, (size_t)n + 1);
-    return out;
+    const int n = snprintf(out, size, "%s/XXXXXX", root);
+    return n < 0 || (size_t)n >= size ? NULL : mkdtemp(out);
 }
 
 double test_random(uint64_t *seed, double lower, double upper) {
