@@ -7,7 +7,7 @@
 
 /* Times the usual work of a frame, preparation included: with the prediction that may follow and
  * what units of hard frames take longer about nine in processor time. */
-#define SOLVE 7.0
+#define SOLVE 6.7
 /* Ahead of a frame there is time, but with a deadline the next one must not wait. */
 #define PREPARE 20.0
 #define PREPARE_BY_CLOCK 8.0
