@@ -5,15 +5,7 @@
 set -u
 model=$1
 arm=$2/models/arm19/arm19.osim
-work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
-cd "$work" || exit 1
-failed=0
-
-fail() {
-    echo "FAILED $1"
-    failed=$((failed + 1))
-}
+. "$(dirname "$0")/../support/script.sh"
 
 # says NAME 'TEXT' arguments: status 0, the text is in the answer
 says() {
