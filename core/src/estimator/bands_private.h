@@ -8,10 +8,10 @@
 #include "estimator/estimator_private.h"
 #include "estimator/gain.h"
 
+#define TWO_SIDED 1.96 /* standard deviations that hold 95 % */
 /* Deviations of a length at which its effect is looked at: passive forces grow so fast that what
- * one makes says little of where 95 % end (1.96 both ways, 1.645 one way). */
-#define MHI_FAR 1.8
-#define TWO_SIDED 1.96                /* standard deviations that hold 95 % */
+ * one makes says little of where 95 % end. */
+#define MHI_FAR TWO_SIDED
 #define SURE 2.33                     /* and 98 % */
 #define ONE_SIDED (1.645 / TWO_SIDED) /* what leaves 5 % on one side, beside that */
 #define MHI_N_VARIANTS 2 /* fibres that are longer beside their optimal length, and shorter */
