@@ -252,11 +252,11 @@ static void tables_are_documented(void **state) {
 
 int main(void) {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(electrodes_of_the_file),    cmocka_unit_test(defaults_of_the_core),
-        cmocka_unit_test(values_of_the_file),        cmocka_unit_test(assignments),
-        cmocka_unit_test(plugin_folders_need_trust), cmocka_unit_test(relative_file_name),
-        cmocka_unit_test(the_line_that_names_a_file),
-        cmocka_unit_test(resolved_run_reads_back),   cmocka_unit_test(tables_are_documented),
+        cmocka_unit_test(electrodes_of_the_file),     cmocka_unit_test(defaults_of_the_core),
+        cmocka_unit_test(values_of_the_file),         cmocka_unit_test(assignments),
+        cmocka_unit_test(plugin_folders_need_trust),  cmocka_unit_test(relative_file_name),
+        cmocka_unit_test(the_line_that_names_a_file), cmocka_unit_test(resolved_run_reads_back),
+        cmocka_unit_test(tables_are_documented),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
