@@ -69,25 +69,14 @@ void near_add(const mix_case *c, int32_t only, mix_near *near) {
 
 static double whole_length(mix_case *c);
 
-/* Without wrap w: of the next level. */
-static double length_without(mix_case *c, int32_t w) {
-    route_work *work = c->work;
-    work->out[w] = 1;
+/* Of the next level, while `mark` of a wrap is set: work->out, the length is without it;
+ * work->whole, its excess counts whole. */
+static double length_while(mix_case *c, uint8_t *mark) {
+    *mark = 1;
     c->level++;
     double value = whole_length(c);
     c->level--;
-    work->out[w] = 0;
-    return value;
-}
-
-/* The wrap's excess counts whole. */
-static double length_with(mix_case *c, int32_t w) {
-    route_work *work = c->work;
-    work->whole[w] = 1;
-    c->level++;
-    double value = whole_length(c);
-    c->level--;
-    work->whole[w] = 0;
+    *mark = 0;
     return value;
 }
 
@@ -102,7 +91,7 @@ static double whole_length(mix_case *c) {
     int32_t w = near.of[0].wrap;
     jet with, without, excess, most, share = {.value = 1}, h[2];
     if (near.n > 1) {
-        value = length_with(c, w);
+        value = length_while(c, &c->work->whole[w]);
     }
     mix_variable(c, 0, value, &with);
     for (int e = 0; e < 2; e++) {
@@ -114,7 +103,7 @@ static double whole_length(mix_case *c) {
             mix_variable(c, 1 + e, off, &h[e]);
         }
     }
-    value = length_without(c, w);
+    value = length_while(c, &c->work->out[w]);
     if (!(with.value - value > MIX_SAME)) {
         return mix_result(c, &with);
     }
