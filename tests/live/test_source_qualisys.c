@@ -112,6 +112,21 @@ static void read_until(reader *r, int32_t event, int32_t times, const char *said
     }
 }
 
+/* A server that goes on otherwise after ten frames. */
+static qtm_server *read_ten_then(reader *r, int what) {
+    qtm_server *server = qtm_server_start(0);
+    begin_reader(r, qtm_server_port(server), "");
+    open_well(r);
+    read_frames(r, 10);
+    qtm_server_set(server, what);
+    return server;
+}
+
+static void end(reader *r, qtm_server *server) {
+    r->ops->destroy(r->self);
+    qtm_server_stop(server);
+}
+
 static void numbers_as_they_are(void **state) {
     (void)state;
     qtm_server *server = qtm_server_start(0);
@@ -134,8 +149,7 @@ static void numbers_as_they_are(void **state) {
     read_frames(&r, 200);
     assert_true(r.n_analog >= 5 * 199);
     assert_int_equal(r.seen[MHE_SOURCE_WARNING], 0);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 /* The official client sees the same server, at the same time. */
@@ -151,8 +165,7 @@ static void the_official_client(void **state) {
                    MHE_TEST_SOURCE_DIR "/tests/live/qtm_client.js", (int)qtm_server_port(server));
     const int code = system(command);
     read_frames(&r, 20);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
     if (WEXITSTATUS(code) == 77) {
         print_message("skipped: qualisys-rt is not installed (./bootstrap test does)\n");
         skip();
@@ -169,8 +182,7 @@ static void markers_alone(void **state) {
     assert_int_equal(r.ops->count(r.self), 1);
     read_frames(&r, 20);
     assert_int_equal(r.n_analog, 0);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 static void what_is_not_there(void **state) {
@@ -187,8 +199,7 @@ static void what_is_not_there(void **state) {
     begin_reader(&r, port, "");
     assert_int_equal(open_reader(&r, NULL, &err), MHE_E_INPUT);
     assert_non_null(strstr(err.text, "no valid XML"));
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
     begin_reader(&r, port, "");
     err.text[0] = '\0';
     assert_int_equal(open_reader(&r, "no QTM at 127.0.0.1", &err), MHE_RETRY);
@@ -208,8 +219,7 @@ static void fault(int what, int32_t event, const char *said) {
     read_until(&r, event, 1, said);
     qtm_server_set(server, QTM_STREAM);
     read_frames(&r, 10);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 static void faults(void **state) {
@@ -256,46 +266,32 @@ static void a_server_that_is_no_use(void **state) {
 /* Times that go back are the core's to deal with; the source hands all frames on. */
 static void frames_that_go_back(void **state) {
     (void)state;
-    qtm_server *server = qtm_server_start(0);
     reader r;
-    begin_reader(&r, qtm_server_port(server), "");
-    open_well(&r);
-    read_frames(&r, 10);
-    qtm_server_set(server, QTM_BACK);
+    qtm_server *server = read_ten_then(&r, QTM_BACK);
     read_frames(&r, 100);
     assert_int_equal(r.seen[MHE_SOURCE_LOST] + r.seen[MHE_SOURCE_WARNING], 0);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 static void another_rate(void **state) {
     (void)state;
-    qtm_server *server = qtm_server_start(0);
     reader r;
     mhe_stream_info info = {.size = sizeof info};
-    begin_reader(&r, qtm_server_port(server), "");
-    open_well(&r);
-    read_frames(&r, 10);
-    qtm_server_set(server, QTM_SPEED);
+    qtm_server *server = read_ten_then(&r, QTM_SPEED);
     read_until(&r, MHE_SOURCE_CHANGED, 1, "other markers or channels");
     assert_int_equal(r.ops->stream(r.self, 1, &info, NULL), MHE_OK);
     assert_true(info.rate == 1000);
     const int32_t before = r.n_analog;
     read_frames(&r, 20);
     assert_true(r.n_analog - before >= 2 * QTM_SAMPLES * 19);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 /* Data that differ from what is described for good are told once, not with every frame. */
 static void unlike_its_settings(void **state) {
     (void)state;
-    qtm_server *server = qtm_server_start(0);
     reader r;
-    begin_reader(&r, qtm_server_port(server), "");
-    open_well(&r);
-    read_frames(&r, 10);
-    qtm_server_set(server, QTM_UNLIKE);
+    qtm_server *server = read_ten_then(&r, QTM_UNLIKE);
     read_until(&r, MHE_SOURCE_WARNING, 1, "other numbers of markers");
     const int32_t analog = r.n_analog;
     const double until = now() + PATIENCE;
@@ -307,8 +303,7 @@ static void unlike_its_settings(void **state) {
     assert_int_equal(r.seen[MHE_SOURCE_CHANGED], 0);
     qtm_server_set(server, QTM_STREAM);
     read_frames(&r, 10);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 /* The server is started anew on the same port. */
@@ -326,8 +321,7 @@ static void started_again(void **state) {
     assert_non_null(server);
     read_until(&r, MHE_SOURCE_CHANGED, 1, "QTM is back");
     read_frames(&r, 10);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 static void other_markers(void **state) {
@@ -348,8 +342,7 @@ static void other_markers(void **state) {
     assert_int_equal(r.ops->stream(r.self, 0, &info, NULL), MHE_OK);
     assert_int_equal(info.n_channels, 3);
     read_frames(&r, 10);
-    r.ops->destroy(r.self);
-    qtm_server_stop(server);
+    end(&r, server);
 }
 
 int main(void) {
