@@ -3,7 +3,8 @@
  *
  *   test_estimator_coverage                  a slice, as a test
  *   test_estimator_coverage DRAWS REFERENCE.sto...   the table of docs/uncertainty.md
- *   test_estimator_coverage NUMBER:DRAWS REFERENCE.sto...   one of its conditions, 0 the first */
+ *   test_estimator_coverage NUMBER:DRAWS REFERENCE.sto...   one of its conditions, 0 the first
+ * DRAWS is the last, or FIRST-LAST. */
 #include "estimator/recording.h"
 #include "fixture.h"
 #include "noise/noise.h"
@@ -190,15 +191,17 @@ static void print_row(const condition *of, const count *c) {
     (void)fflush(stdout);
 }
 
-static void table(int32_t only, int32_t draws, char **references, int32_t n) {
+static void table(int32_t only, const char *draws, char **references, int32_t n) {
+    const char *last = strchr(draws, '-');
+    const int32_t from = last == NULL ? 1 : atoi(draws), to = atoi(last == NULL ? draws : last + 1);
     (void)printf("%-14s %8s %8s %8s %8s %8s %10s %10s %7s\n", "", "forces", "least", "most",
                  "angles", "deg", "error (N)", "band (N)", "trials");
     const int32_t first = only < 0 ? 0 : only, end = only < 0 ? N_CONDITIONS : only + 1;
     for (int32_t i = first; i < end; i++) {
         count c = {0};
-        for (int32_t draw = 0; draw < draws; draw++) {
+        for (int32_t draw = from; draw <= to; draw++) {
             for (int32_t r = 0; r < n; r++) {
-                run(&conditions[i], references[r], 1000 * r + draw + 1, &c);
+                run(&conditions[i], references[r], 1000 * r + draw, &c);
             }
         }
         print_row(&conditions[i], &c);
@@ -227,7 +230,7 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         const char *draws = strchr(argv[1], ':');
         const int32_t only = draws == NULL ? -1 : atoi(argv[1]) % N_CONDITIONS;
-        table(only, atoi(draws == NULL ? argv[1] : draws + 1), argv + 2, argc - 2);
+        table(only, draws == NULL ? argv[1] : draws + 1, argv + 2, argc - 2);
         return 0;
     }
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -29,6 +29,7 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                               {&b->near, n},
                               {&b->below, b->n_m},
                               {&b->above, b->n_m},
+                              {&b->room, b->n_m},
                               {&b->at, b->n_x * n},
                               {&b->controls, b->n_u * n},
                               {&b->row, n},
@@ -181,10 +182,13 @@ typedef struct sum {
     int32_t above; /* the long tail is that of truths above the estimate */
 } sum;
 
-static sum sum_of(const mhi_bands *b, const double *row) {
+/* `cut` is what bounds leave of the answers to other causes than column `own`, a share: their tails
+ * are what is cut off first. */
+static sum sum_of(const mhi_bands *b, const double *row, int32_t own, double cut) {
     double squares = 0, far = 0, near = 0;
     for (int32_t i = 0; i < b->gain.n_columns; i++) {
-        const double square = row[i] * row[i], cube = square * row[i];
+        const double square = row[i] * row[i];
+        const double cube = square * row[i] * (i == own ? 1 : cut * cut);
         squares += square;
         far += b->far[i] * cube;
         near += b->near[i] * cube;
@@ -195,14 +199,13 @@ static sum sum_of(const mhi_bands *b, const double *row) {
 
 /* Such that 1.96 of it hold 95 % on either side, by the side that reaches further. */
 static double reach_of(const mhi_bands *b, const double *row) {
-    const sum s = sum_of(b, row);
+    const sum s = sum_of(b, row, -1, 1);
     return s.sd * (1 + s.far);
 }
 
-/* The same of a number whose truth is no more than `below` and `above` off. Where one side is held
+/* The same of a sum whose truth is no more than `below` and `above` off. Where one side is held
  * whole, all of the 5 % may lie on the other. */
-static double reach_within(const mhi_bands *b, const double *row, double below, double above) {
-    const sum s = sum_of(b, row);
+static double reach_within(sum s, double below, double above) {
     const double far = s.sd * (1 + s.far), near = s.sd * (1 - s.near);
     const double up = s.above ? far : near; /* truth above the estimate */
     const double down = s.above ? near : far;
@@ -244,13 +247,24 @@ static void measure_moments(mhi_bands *b) {
 }
 
 /* The row of a muscle's activation as it is while its control is between its bounds: what they
- * leave now says reach_within(). Only the error of its own force it makes good as bounds let it. */
-static void let_go(const mhi_bands *b, int32_t m, double *row) {
-    const double own = row[b->n_m + m], more = 1 / b->gain.known.free[m];
+ * leave now says reach_within(). Only the error of its own force it makes good as bounds let it.
+ * However much the other causes ask of it, the truth is no further than the bound that is further
+ * off: what they make of it is cut off there. Gives the share that is left. */
+static double let_go(const mhi_bands *b, int32_t m, double *row) {
+    const int32_t own = b->n_m + m;
+    const double most = b->room[m] / TWO_SIDED, good = row[own];
+    double squares = 0;
+    row[own] = 0;
     for (int32_t i = 0; i < b->gain.n_columns; i++) {
-        row[i] *= more;
+        squares += row[i] * row[i];
     }
-    row[b->n_m + m] = own;
+    const double sd = sqrt(squares) / b->gain.known.free[m];
+    const double cut = sd > most ? most / sd : 1;
+    for (int32_t i = 0; i < b->gain.n_columns; i++) {
+        row[i] *= cut / b->gain.known.free[m];
+    }
+    row[own] = good;
+    return cut;
 }
 
 /* Standard deviations from the errors of the output's node, in b->at and b->controls. */
@@ -268,8 +282,8 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
     for (int32_t m = 0; m < b->n_m; m++) {
         double *row = b->force_error + m * n;
         memcpy(row, activation_row(e, b, m), sizeof(double) * (size_t)n);
-        let_go(b, m, row);
-        b->activation[m] = reach_within(b, row, b->below[m], b->above[m]);
+        const double cut = let_go(b, m, row);
+        b->activation[m] = reach_within(sum_of(b, row, b->n_m + m, cut), b->below[m], b->above[m]);
         row[b->n_m + m] += b->size[b->n_m + m];
         for (int32_t i = 0; i < n; i++) {
             row[i] *= muscles->force_a[m];
@@ -280,7 +294,8 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
         }
         const double number = SURE * b->size[b->n_m + m] * muscles->force_a[m];
         b->force_sd[m] = reach_within(
-            b, row, fmin(b->below[m] * muscles->force_a[m] + number, fmax(0, muscles->force[m])),
+            sum_of(b, row, b->n_m + m, cut),
+            fmin(b->below[m] * muscles->force_a[m] + number, fmax(0, muscles->force[m])),
             b->above[m] * muscles->force_a[m] + number * (1 + b->far[b->n_m + m]));
     }
 }

@@ -181,6 +181,7 @@ static void limit_activation(const mhe_estimator *e, mhi_bands *b, int32_t k, in
     const double least = mhi_ocp_u_lower(e->ocp, k)[m], most = mhi_ocp_u_upper(e->ocp, k)[m];
     b->below[m] = fmax(0, activation - least);
     b->above[m] = fmax(0, most - activation);
+    b->room[m] = fmax(b->below[m], b->above[m]);
     if (!isnan(emg)) {
         const double off = SURE * b->size[m];
         b->below[m] = fmin(b->below[m], fmax(0, u - emg + off));

@@ -47,6 +47,7 @@ struct mhi_bands {
                              * truth above what is at hand; negative: one below it */
     double *below, *above;  /* [n_m] the most that an activation may be off below and above
                              * its estimate, by its EMG and its bounds */
+    double *room;           /* [n_m] to the bound that is further off */
     double *at;             /* [n_x x columns] error of the output's node */
     double *controls;       /* [n_u x columns] of node 0; then of the output's node */
     double *row;            /* [columns] */
