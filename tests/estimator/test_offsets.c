@@ -92,6 +92,11 @@ static outcome run(const char *cost, const char *data, double off, int32_t missi
         out.place += pow(found[i] - offset[i], 2) / N;
         assert_true(i / 3 != missing || found[i] == 0); /* nothing is known of it */
     }
+    double told[N] = {0};
+    assert_int_equal(mhe_estimator_marker_offsets(f.estimator, told), found != NULL);
+    for (int32_t i = 0; i < N; i++) {
+        assert_true(told[i] == (found == NULL ? 0 : found[i]));
+    }
     out.place = sqrt(out.place);
     out.angle = sqrt(out.angle / n);
     out.late = sqrt(out.late / n_late);
