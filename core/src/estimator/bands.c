@@ -29,8 +29,8 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                               {&b->size, n},
                               {&b->free, b->n_m},
                               {&b->noise_share, b->n_m},
-                              {&b->far, n},
-                              {&b->near, n},
+                              {&b->far, b->gain.fixed},
+                              {&b->near, b->gain.fixed},
                               {&b->below, b->n_m},
                               {&b->above, b->n_m},
                               {&b->room, b->n_m},
@@ -190,12 +190,15 @@ typedef struct sum {
  * are what is cut off first. */
 static sum sum_of(const mhi_bands *b, const double *row, int32_t own, double cut) {
     double squares = 0, far = 0, near = 0;
-    for (int32_t i = 0; i < b->gain.n_columns; i++) {
+    for (int32_t i = 0; i < b->gain.fixed; i++) {
         const double square = row[i] * row[i];
         const double cube = square * row[i] * (i == own ? 1 : cut * cut);
         squares += square;
         far += b->far[i] * cube;
         near += b->near[i] * cube;
+    }
+    for (int32_t i = b->gain.fixed; i < b->gain.n_columns; i++) { /* postures have no tails */
+        squares += row[i] * row[i];
     }
     const double sd = sqrt(squares), unit = squares > 0 ? 1 / (squares * sd) : 0;
     return (sum){sd, fabs(far) * unit, fmin(1, fabs(near) * unit), near > 0};

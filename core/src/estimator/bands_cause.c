@@ -293,14 +293,19 @@ void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
         if (isnan(emg[m])) {
             continue;
         }
-        seen += (u[m] - emg[m]) * (u[m] - emg[m]) / (scale * scale);
+        const double unit = 1 / (scale * scale);
+        double squares = 0, of_noise = 0;
         for (int32_t i = 0; i < b->gain.n_columns; i++) {
-            const double error = row[i] - (i == m ? b->size[m] : 0);
-            const double square = error * error / (scale * scale);
-            const double share = i < b->n_m ? b->noise_share[i] : 0;
-            noise += share * square / (level * FEW * FEW);
-            others += (1 - share) * square;
+            squares += row[i] * row[i];
         }
+        squares += b->size[m] * (b->size[m] - 2 * row[m]); /* of EMG itself, too */
+        for (int32_t i = 0; i < b->n_m; i++) {
+            const double error = row[i] - (i == m ? b->size[m] : 0);
+            of_noise += b->noise_share[i] * error * error;
+        }
+        seen += (u[m] - emg[m]) * (u[m] - emg[m]) * unit;
+        noise += of_noise * unit / (level * FEW * FEW);
+        others += (squares - of_noise) * unit;
     }
     if (!(noise > 0) || !b->config->emg_measured) {
         return;
