@@ -3,15 +3,19 @@
 
 #include <string.h>
 
+/* All lengths together, and tendons alone: curves may look at those otherwise than by the norm
+ * length of the fibres (the passive force of the paper's begins where a fibre is as long as the
+ * slack tendon). */
 static mhe_status create_variants(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
     const mhi_uncertainty_section *c = b->config;
+    const mhi_variation all = {
+        .fiber = c->optimal_fiber_length, .tendon = c->tendon_slack_length, .path = c->path_length};
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < MHI_N_VARIANTS && status == MHE_OK; i++) {
-        const mhi_variation by = {.fiber = c->optimal_fiber_length,
-                                  .tendon = c->tendon_slack_length,
-                                  .path = c->path_length,
-                                  .far = i == 0 ? MHI_FAR : -MHI_FAR};
-        if (by.fiber > 0 || by.tendon > 0 || by.path > 0) {
+        mhi_variation by = i < 2 ? all : (mhi_variation){.tendon = all.tendon};
+        const int32_t other = i < 2 || all.fiber > 0 || all.path > 0;
+        by.far = i % 2 == 0 ? MHI_FAR : -MHI_FAR;
+        if (other && (by.fiber > 0 || by.tendon > 0 || by.path > 0)) {
             status = mhi_variant_create(e->system, &by, &b->variants[i], err);
         }
     }

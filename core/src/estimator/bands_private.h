@@ -14,7 +14,8 @@
 #define MHI_FAR TWO_SIDED
 #define SURE 2.33                     /* and 98 % */
 #define ONE_SIDED (1.645 / TWO_SIDED) /* what leaves 5 % on one side, beside that */
-#define MHI_N_VARIANTS 2 /* fibres that are longer beside their optimal length, and shorter */
+#define MHI_N_VARIANTS 4 /* fibres longer beside their optimal length, and shorter; tendons, too \
+                          */
 
 /* How large the noise of EMG is beside what the config says, by its residuals: sums that forget. */
 typedef struct mhi_emg_level {

@@ -68,6 +68,14 @@ mhe_status mhe_estimator_covers(const mhe_estimator *e, double first, double las
     return status;
 }
 
+int32_t mhe_estimator_marker_offsets(const mhe_estimator *e, double *offsets) {
+    if (e == NULL || offsets == NULL || !(e->rates.offsets.sd > 0)) {
+        return 0;
+    }
+    memcpy(offsets, e->rates.offsets.value, sizeof *offsets * (size_t)e->rates.offsets.n);
+    return 1;
+}
+
 /* As OpenSim calls them: "hip_r_on_femur_r_in_femur_r". */
 static mhe_status name_joints(mhe_estimator *e, mhe_error *err) {
     const mhe_description *d = e->description;

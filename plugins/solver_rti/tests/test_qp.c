@@ -397,7 +397,71 @@ static void test_families(void **state) {
     }
 }
 
+/* From the same multipliers, with the tail first or without; the result -> w. */
+static int solve_from(program *p, const double *lower, const double *upper, int tail, double *w) {
+    const size_t z = size_z(&p->shape);
+    for (size_t i = 0; i < z; i++) {
+        p->qp.w[i] = p->qp.fixed[i] ? p->qp.lower[i] : 0;
+    }
+    memcpy(p->qp.z_lower, lower, sizeof *lower * z);
+    memcpy(p->qp.z_upper, upper, sizeof *upper * z);
+    p->qp.ahead = tail ? 0 : 1000;
+    assert_int_equal(qp_solve(&p->qp, p->stages, &tight, 1), QP_SOLVED);
+    double worst[4] = {0};
+    assert_true(off(p, worst) <= 1e-8);
+    memcpy(w, p->qp.w, sizeof *w * z);
+    return p->qp.iterations;
+}
+
+/* Long windows whose sets changed at their ends: the last stages by themselves come to them, and
+ * the answer is the same as without. */
+static void compare_tails(const recipe *r) {
+    int n = 0, tails = 0, with = 0, without = 0;
+    for (int i = 0; i < r->n_programs; i++) {
+        program p;
+        seed = (uint64_t)i * 7919u + 29u;
+        make(&p, r);
+        const size_t z = size_z(&p.shape), end = z - 4 * (size_t)p.shape.ld_z;
+        if (p.shape.N >= 20 && qp_solve(&p.qp, p.stages, &tight, 0) == QP_SOLVED) {
+            double *lower = take(4 * z, sizeof *lower);
+            double *upper = lower + z, *w = upper + z, *other = w + z;
+            memcpy(lower, p.qp.z_lower, sizeof *lower * z);
+            memcpy(upper, p.qp.z_upper, sizeof *upper * z);
+            confuse(&p);
+            memcpy(lower + end, p.qp.z_lower + end, sizeof *lower * (z - end));
+            memcpy(upper + end, p.qp.z_upper + end, sizeof *upper * (z - end));
+            p.qp.tails = 0;
+            without += solve_from(&p, lower, upper, 0, other);
+            assert_int_equal(p.qp.tails, 0);
+            with += solve_from(&p, lower, upper, 1, w);
+            tails += p.qp.tails;
+            for (size_t j = 0; j < z; j++) {
+                assert_true(fabs(w[j] - other[j]) <= 1e-7 * (1 + fabs(other[j])));
+            }
+            n++;
+            free(lower);
+        }
+        drop(&p);
+    }
+    print_message("%-16s %5d programs, %d tails, %.2f systems with and %.2f without\n", r->name, n,
+                  tails, (double)with / n, (double)without / n);
+    assert_true(n > 100 && tails > n / 3);
+    assert_true(with < without);
+}
+
+static void test_tails(void **state) {
+    (void)state;
+    static const recipe families[] = {
+        {"long", 300, 12, 12, 60, 1, 0, 0.7, 0.2, 0, 0, 0, 1, 1},
+        {"long, controls", 300, 4, 20, 60, 0.5, 0, 0.7, 0.3, 0, 0, 0, 0, 1},
+    };
+    for (size_t i = 0; i < sizeof families / sizeof families[0]; i++) {
+        compare_tails(&families[i]);
+    }
+}
+
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(test_families)};
+    const struct CMUnitTest tests[] = {cmocka_unit_test(test_families),
+                                       cmocka_unit_test(test_tails)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }
