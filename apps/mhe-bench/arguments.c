@@ -28,6 +28,11 @@ static const words_option options[] = {
      .at = AT(repeats),
      .low = 1,
      .high = REPEATS_MAX},
+    {.name = "--no-layers",
+     .help = "whole runs alone",
+     .kind = WORDS_FLAG,
+     .at = AT(no_layers),
+     .low = 1},
     {.name = "--frames",
      .help = "writes frames.csv, too: preparation and feedback of every estimate in every run (but "
              "the first, which starts from nothing)",
@@ -54,7 +59,7 @@ const words_program arguments_program = {
                "alternation.",
     .usage =
         "  mhe-bench CONFIG.yaml [--set path.to.key=value]... [--vary path.to.key=v1,v2,v3]...\n"
-        "            [--repeats N] [--frames] [--quick] [--out DIR]\n"
+        "            [--repeats N] [--no-layers] [--frames] [--quick] [--out DIR]\n"
         "  mhe-bench --scale [--set path.to.key=value]... [--repeats N] [--quick] [--out DIR]\n"
         "  mhe-bench --version | --help\n",
     .notes = "Layers are timed once for all windows. Exit status: 0 done; 1 a run failed; 2 the\n"

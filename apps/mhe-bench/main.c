@@ -62,7 +62,8 @@ static mhe_status measure(const arguments *a, const variants *v, const mhe_host 
                                .repeats = a->repeats > 0 ? a->repeats
                                           : a->quick     ? QUICK_REPEATS
                                                          : REPEATS,
-                               .estimates = a->quick ? QUICK_ESTIMATES : 0};
+                               .estimates = a->quick ? QUICK_ESTIMATES : 0,
+                               .no_layers = a->no_layers};
     bench *b = malloc(sizeof *b);
     if (b == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");

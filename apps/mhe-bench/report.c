@@ -108,7 +108,9 @@ void report_table(const bench *b, mhi_text *out) {
     mhi_text_add(out, "%s: %d coordinates, %d muscles, %d markers; %d %s of each variant\n\n",
                  r->info.config_name, r->info.n_q, r->info.n_muscles, r->info.n_markers,
                  b->setup->repeats, b->setup->repeats == 1 ? "run" : "runs, in alternation,");
-    add_layers(b, out);
+    if (b->n_layers > 0) {
+        add_layers(b, out);
+    }
     add_runs(b, out);
     add_parts(b, out);
     if (b->setup->repeats > 1) {

@@ -57,8 +57,10 @@ grep -q 'feedback by frame' table.txt && fail "one run has no medians of frames"
 [ ! -e result/frames.csv ] || fail "frames.csv was not asked for"
 
 # Each frame by its median over three runs: as what is written of every frame says.
-"$bench" "$demo" --quick --repeats 3 --frames --vary horizon.window=2,3 --out frames > table.txt 2> err.txt || fail "--frames: $(cat err.txt)"
+"$bench" "$demo" --quick --repeats 3 --no-layers --frames --vary horizon.window=2,3 --out frames > table.txt 2> err.txt || fail "--frames: $(cat err.txt)"
 has table.txt 'feedback by frame, ms' 'one run, x' 'p99.9, x'
+grep -q 'us a call' table.txt && fail "no layers were asked for"
+grep -q '"us"' frames/bench.json && fail "no layers were asked for"
 # A heading; of each variant three runs of 25 estimates but the first, which are numbered from 2.
 [ "$(wc -l < frames/frames.csv)" -eq 145 ] || fail "$(wc -l < frames/frames.csv) lines of frames"
 if command -v python3 > /dev/null; then
