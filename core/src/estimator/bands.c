@@ -38,6 +38,7 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                               {&b->controls, b->n_u * n},
                               {&b->row, n},
                               {&b->marker_q, 3 * e->n_k * b->n_q},
+                              {&b->unknown, b->n_q * b->n_q},
                               {&b->marker, 3 * e->n_k},
                               {&b->force, b->n_m},
                               {&b->more, b->n_m},

@@ -53,6 +53,7 @@ struct mhi_bands {
     double *controls;       /* [n_u x columns] of node 0; then of the output's node */
     double *row;            /* [columns] */
     double *marker_q;       /* [3 n_k x n_q] */
+    double *unknown;        /* [n_q x n_q] of learnt offsets; scratch */
     double *marker, *force; /* [3 n_k], [n_m] scratch */
     double *more, *less;    /* [n_m] the most that forces are above and below; scratch */
     double *force_error;    /* [n_m x columns] */

@@ -295,3 +295,33 @@ void mhi_offsets_hold(mhi_offsets *o, int32_t k, int32_t coordinate) {
         o->node[k].held[coordinate] = 1;
     }
 }
+
+int32_t mhi_offsets_unknown(mhi_offsets *o, const double *q, const double *markers, double *out) {
+    const ptrdiff_t n = o->n, n_q = o->n_q;
+    memcpy(o->now.q, q, sizeof(double) * (size_t)n_q);
+    memcpy(o->now.measured, markers, sizeof(double) * (size_t)n);
+    if (!look_from(o, &o->now, o->rotation)) {
+        return 0;
+    }
+    const double says = 1 / noise(o);
+    for (ptrdiff_t i = 0; i < n; i++) {
+        for (ptrdiff_t j = 0; j <= i; j++) {
+            o->work[i * n + j] = says * o->sum.normal[i * n + j];
+        }
+        o->work[i * n + i] += 1 / (o->sd * o->sd);
+    }
+    if (mhi_cholesky_factor(o->work, o->n) != 0) {
+        return 0;
+    }
+    memcpy(o->slope, o->jacobian, sizeof(double) * (size_t)(n * n_q));
+    mhi_cholesky_solve(o->work, o->n, o->slope, o->n_q);
+    memset(out, 0, sizeof(double) * (size_t)(n_q * n_q));
+    for (ptrdiff_t i = 0; i < n; i++) {
+        for (ptrdiff_t a = 0; a < n_q; a++) {
+            for (ptrdiff_t c = 0; c < n_q; c++) {
+                out[a * n_q + c] += o->jacobian[i * n_q + a] * o->slope[i * n_q + c];
+            }
+        }
+    }
+    return 1;
+}

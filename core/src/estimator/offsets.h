@@ -54,5 +54,10 @@ void mhi_offsets_correct(const mhi_offsets *offsets, int32_t k, const double *ma
 void mhi_offsets_learn(mhi_offsets *offsets, int32_t k, const double *markers, double *q);
 /* A coordinate of node k is measured otherwise: what is learnt does not move it. */
 void mhi_offsets_hold(mhi_offsets *offsets, int32_t k, int32_t coordinate);
+/* What is not known of the offsets, in the posture q, whose markers [n] some may be missing of:
+ * J^T P J -> out [n_q x n_q], J the markers' slopes and P the covariance that what is expected and
+ * all looks leave. 0: there is none. [hot] */
+int32_t mhi_offsets_unknown(mhi_offsets *offsets, const double *q, const double *markers,
+                            double *out);
 
 #endif
