@@ -64,6 +64,8 @@ status=$?
 if [ $status -eq 1 ]; then
     grep -q interrupted cut.txt || fail "Ctrl-C: $(cat cut.txt)"
     [ -z "$(find . -path './cut/.*' -type f)" ] || fail "Ctrl-C leaves temporary files"
+elif [ $status -eq 130 ]; then # when all was written: what is left to do is the shell's to end
+    [ -s cut/estimates.sto ] || fail "Ctrl-C: ended without results"
 elif [ $status -ne 0 ]; then
     fail "Ctrl-C: exit status $status"
 fi

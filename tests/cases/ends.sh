@@ -185,8 +185,11 @@ config upside-down usual 7 3 'bounds: {excitation_min: 0.6, excitation_max: 0.1}
 told upside-down usual 2 "bounds: 'excitation_min' is above 'excitation_max'"
 config unreachable usual 7 3 'bounds: {excitation_max: 0.01, activation_min: 0.3}'
 told unreachable usual 1 'every solve failed'
+told unreachable usual 1 'within its bounds; activation of'
 config apart usual 7 3 'bounds: {excitation_min: 0.05, excitation_max: 0.05, activation_min: 0.3, activation_max: 0.3}'
 told apart usual 1 'every solve failed'
+told apart usual 1 'at their bounds: activation (all of one value), excitation (all of one value)'
+told apart usual 1 'bounds: excitation_min and excitation_max are both 0.05: the controls are fixed'
 
 echo "$count configs"
 [ -n "${KEEP:-}" ] && cp -r . "$KEEP"

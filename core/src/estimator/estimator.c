@@ -188,6 +188,9 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
             mhi_begin_create(&e->begin, e->system, mhi_ocp_context(e->ocp), n + 1, &e->arena, err);
     }
     if (status == MHE_OK) {
+        status = mhi_unmet_create(&e->unmet, mhi_ocp_face(e->ocp)->n_x, &e->arena, err);
+    }
+    if (status == MHE_OK) {
         mhi_start_set_tasks(e->begin.start, e->tasks);
         status = mhi_rates_create(&e->rates, run, e->system, mhi_ocp_context(e->ocp), e->tasks,
                                   n + 1, &e->arena, err);

@@ -225,14 +225,15 @@ static void spend(mhe_estimator *e, double work) {
 
 /* Nothing is told of a first window that took its time and settled. */
 static void tell_first(mhe_estimator *e) {
-    char line[256];
+    char line[256 + MHI_UNMET_TEXT];
+    const char *why = e->unmet.now;
     e->pace.first_told = 1;
     (void)snprintf(
         line, sizeof line,
         "from %.6g s on the first window found no motion that fits within the work it may "
-        "take; estimates go on from what there is. Do the recording's units, axes and "
-        "labels fit the model?",
-        e->window.times[0]);
+        "take%s%s%s; estimates go on from what there is. Do the bounds, and the recording's units, "
+        "axes and labels, fit the model?",
+        e->window.times[0], *why != '\0' ? " (" : "", why, *why != '\0' ? ")" : "");
     e->host->log(e->host, MHE_LOG_WARNING, line);
 }
 
