@@ -106,9 +106,10 @@ def test_where_and_when():
 
 
 def test_forces_as_cost():
-    """Little forces are asked for beside: strengths are found as without, and the forces are a little less."""
+    """Little forces and steady excitations are asked for beside: strengths are found nearly as without."""
     least = CONFIG.replace("residual_torque: 0.1}]", "residual_torque: 0.1}, {plugin: mhe.cost.track, signal: muscle_force, value: [0], "
-                           "sigma: 500}, {plugin: mhe.cost.track, signal: joint_moment, value: [0], sigma: 1000}]")
+                           "sigma: 500}, {plugin: mhe.cost.track, signal: joint_moment, value: [0], sigma: 1000}, "
+                           "{plugin: mhe.cost.rate, signal: excitation, sigma: 1}]")
     write("least.yaml", least)
     done = run(CALIBRATE, "least.yaml", "--out", "least", "--quiet")
     assert done.returncode == 0, done.stderr

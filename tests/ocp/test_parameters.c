@@ -35,6 +35,15 @@ static const char *const configs[] = {
     "activation\n"
     "costs: [{plugin: mhe.cost.track, signal: muscle_force, sigma: 100},\n"
     "  {plugin: mhe.cost.track, signal: joint_moment, sigma: 5}]\n",
+    /* of the node before, as it is measured: with gains, shapes and delays, offsets, muscles */
+    "model: {file: $ARM19}\nmuscle: {curves: degroote2016}\n"
+    "costs: [{plugin: mhe.cost.rate, signal: excitation, sigma: 0.1},\n"
+    "  {plugin: mhe.cost.rate, signal: muscle_force, sigma: 100},\n"
+    "  {plugin: mhe.cost.rate, signal: joint_moment, sigma: 5},\n"
+    "  {plugin: mhe.cost.rate, signal: markers, sigma: 0.1}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: degroote2016}\nformulation: activation\n"
+    "costs: [{plugin: mhe.cost.rate, signal: activation, sigma: 0.1},\n"
+    "  {plugin: mhe.cost.rate, signal: muscle_force, sigma: 100}]\n",
 };
 
 /* A cost whose residuals are of several signals each: products of neighbours in y. */
@@ -230,6 +239,9 @@ static void random_point(rig *r, uint64_t *seed, double *x, double *u) {
                : i < 2 * s->n_q ? test_random(seed, 0.5, 1.5)
                                 : test_random(seed, 0.2, 0.8);
     }
+    for (int32_t i = s->n_x; i < r->problem->n_x; i++) { /* of the node before */
+        x[i] = 0.1 * (i % 9) - 0.4;
+    }
     for (int32_t i = 0; i < s->n_u; i++) {
         u[i] = i < s->n_m ? test_random(seed, 0.1, 0.9) : test_random(seed, -2, 2);
     }
@@ -365,7 +377,7 @@ static void several_signals_at_once(void **state) {
 static void check_mixed(const char *config) {
     uint64_t seed = 3;
     rig r;
-    double z[160];
+    double z[256];
     rig_open(&r, config);
     const int32_t n_x = r.problem->n_x, n_u = r.problem->n_u, k = 1, n_p = r.n_p;
     random_point(&r, &seed, z, z + n_x);
@@ -387,6 +399,12 @@ static void check_mixed(const char *config) {
         double *target = mhi_ocp_target(r.ocp, s, k);
         for (int32_t i = 0; i < signals->signal[s].n_y && (wanted >> s & 1); i++) {
             target[i] = y[signals->signal[s].offset + i];
+        }
+    }
+    for (int32_t s = 0; s < MHI_N_SIGNALS; s++) { /* and what was there before */
+        const mhi_signal *m = &signals->signal[MHI_N_SIGNALS + s];
+        for (int32_t i = 0; i < m->n_y; i++) {
+            z[m->column - n_u + i] = y[signals->signal[s].offset + i] / m->scale;
         }
     }
     double *px = calloc((size_t)(n_p * n_x), sizeof *px),
@@ -413,17 +431,18 @@ static void mixed_derivatives(void **state) {
     (void)state;
     check_mixed(configs[0]);
     check_mixed(configs[4]);
+    check_mixed(configs[6]);
 }
 
 /* What leads from one motion to the next: its first state is whatever the controls say, and of what
  * was before nothing is left. */
-static void a_junction_forgets(void **state) {
-    (void)state;
+static void check_junction(const char *config) {
     uint64_t seed = 11;
     rig r;
     double x[128], other[128], u[8][64], first[128];
-    rig_open(&r, configs[2]);
-    const int32_t n_x = r.problem->n_x;
+    rig_open(&r, config);
+    const int32_t n_x = r.problem->n_x, n_states = mhi_ocp_n_x(r.ocp);
+    int32_t begins = 2;
     double from[2][128];
     random_point(&r, &seed, x, u[0]);
     random_point(&r, &seed, other, u[0]);
@@ -440,9 +459,10 @@ static void a_junction_forgets(void **state) {
                 r.problem->evaluate(r.problem, 0, k, from[which], u[r.place[k]], &out, &r.f.err),
                 MHE_OK);
             memcpy(from[which], first, sizeof *first * (size_t)n_x);
+            begins = k + 1;
         }
     }
-    for (int32_t i = 0; i < n_x; i++) {
+    for (int32_t i = 0; i < n_states; i++) {
         int32_t found = 0;
         assert_true(from[0][i] == from[1][i]);
         for (int32_t k = 0; k < 8 && !found; k++) {
@@ -452,7 +472,25 @@ static void a_junction_forgets(void **state) {
         }
         assert_true(found); /* each is some control: all states can be reached */
     }
+    double cost[2];
+    for (int32_t which = 0; which < 2; which++) { /* what is carried there is nothing */
+        random_point(&r, &seed, x, u[0]);
+        memcpy(which == 0 ? other : x, which == 0 ? x : other, sizeof *x * (size_t)n_states);
+        const mhe_stage_values out = {.size = sizeof out, .cost = &cost[which]};
+        assert_int_equal(r.problem->evaluate(r.problem, 0, begins, x, u[1], &out, &r.f.err),
+                         MHE_OK);
+        for (int32_t i = n_states; i < n_x; i++) {
+            assert_true(from[which][i] == 0);
+        }
+    }
+    assert_true(cost[0] == cost[1]);
     rig_close(&r);
+}
+
+static void a_junction_forgets(void **state) {
+    (void)state;
+    check_junction(configs[2]);
+    check_junction(configs[6]);
 }
 
 int main(void) {

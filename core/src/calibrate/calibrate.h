@@ -89,8 +89,9 @@ mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err
 mhe_status mhi_calibration_doubt(const mhi_calibration *c, mhe_error *err);
 /* motion.c: recordings and the motion that the estimator finds in them with the model as it is. */
 mhe_status mhi_motion_read(mhi_calibration *c, int32_t i, mhe_error *err);
-mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t n_u, double *x,
-                            double *u, mhe_error *err);
+/* The first `n_states` of x [nodes x n_x], and u [nodes x n_u]. */
+mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_states, int32_t n_x,
+                            int32_t n_u, double *x, double *u, mhe_error *err);
 /* loads.c: the forces of the config, and then one for the loads of each recording that has some;
  * taken from the arena. What acts at every node. */
 mhe_status mhi_motion_forces(mhi_calibration *c, mhi_force_setup **forces, int32_t *n,

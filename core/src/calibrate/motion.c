@@ -28,17 +28,17 @@ static int32_t node_of(const mhi_motion *m, double time, int32_t ratio) {
     return k < 0 ? 0 : k > m->n_nodes - 1 ? m->n_nodes - 1 : (int32_t)k;
 }
 
-static void keep(const mhi_motion *m, const mhe_estimate *e, int32_t ratio, int32_t n_x,
-                 int32_t n_u, double *x, double *u) {
+static void keep(const mhi_motion *m, const mhe_estimate *e, int32_t ratio, int32_t n_states,
+                 int32_t n_x, int32_t n_u, double *x, double *u) {
     const int32_t k = node_of(m, e->time, ratio);
-    memcpy(x + (ptrdiff_t)k * n_x, e->states, sizeof *x * (size_t)n_x);
+    memcpy(x + (ptrdiff_t)k * n_x, e->states, sizeof *x * (size_t)n_states);
     if (k < m->n_nodes - 1) {
         memcpy(u + (ptrdiff_t)k * n_u, e->controls, sizeof *u * (size_t)n_u);
     }
 }
 
-mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t n_u, double *x,
-                            double *u, mhe_error *err) {
+mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_states, int32_t n_x,
+                            int32_t n_u, double *x, double *u, mhe_error *err) {
     mhi_motion *m = &c->motions[i];
     mhe_estimator *e = NULL;
     int32_t found = 0;
@@ -62,7 +62,7 @@ mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t 
                 status = mhi_estimator_node(e, j, &estimate, err);
             }
             if (status == MHE_OK) {
-                keep(m, &estimate, c->run->horizon.ratio, n_x, n_u, x, u);
+                keep(m, &estimate, c->run->horizon.ratio, n_states, n_x, n_u, x, u);
             }
         }
         found++;

@@ -189,14 +189,14 @@ static void set_spread(mhi_calibration *c, mhi_ocp *ocp) {
 
 /* Controls of a junction are the state that they lead to, within its bounds alone. */
 static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junction *junction) {
-    const int32_t n_x = junction->n_x, n_u = junction->n_u;
+    const int32_t n_x = junction->n_x, n_all = junction->n_all, n_u = junction->n_u;
     for (int32_t k = 0; k < c->n_intervals; k++) {
         const int32_t number = c->place[k];
         double *u = p->s.u + (ptrdiff_t)k * n_u;
         if (number < 0) {
             continue;
         }
-        const double *first = p->s.x + (ptrdiff_t)(k - number + junction->n) * n_x;
+        const double *first = p->s.x + (ptrdiff_t)(k - number + junction->n) * n_all;
         for (int32_t i = 0; i < n_u; i++) {
             u[i] = 0;
             mhi_ocp_u_lower(p->ocp, k)[i] = -INFINITY;
@@ -208,9 +208,9 @@ static void start_junctions(const mhi_calibration *c, problem *p, const mhi_junc
                 u[control] = first[i];
             }
         }
-        double *next = p->s.x + (ptrdiff_t)(k + 1) * n_x;
+        double *next = p->s.x + (ptrdiff_t)(k + 1) * n_all;
         const mhe_stage_values out = {.size = sizeof out, .x_next = next};
-        mhi_junction_step(junction, number, p->s.x + (ptrdiff_t)k * n_x, u, 0, &out);
+        mhi_junction_step(junction, number, p->s.x + (ptrdiff_t)k * n_all, u, 0, &out);
         for (int32_t i = 0; i < n_x && number < junction->n - 1; i++) {
             mhi_ocp_x_lower(p->ocp, k + 1)[i] = -INFINITY;
             mhi_ocp_x_upper(p->ocp, k + 1)[i] = INFINITY;
@@ -244,7 +244,8 @@ static mhe_status hold_beginnings(mhi_calibration *c, problem *p, mhe_error *err
         if (m->first < 0 || centre == NULL) {
             continue;
         }
-        memcpy(centre, p->s.x + (ptrdiff_t)m->first * f->n_x, sizeof *centre * (size_t)f->n_x);
+        memcpy(centre, p->s.x + (ptrdiff_t)m->first * mhi_ocp_face(p->ocp)->n_x,
+               sizeof *centre * (size_t)f->n_x);
         mhi_ocp_set_prior_at(p->ocp, m->first, centre, weight);
     }
     return c->arena.failed || weight == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
@@ -297,7 +298,8 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
         const mhi_motion *m = &c->motions[i];
         if (m->first >= 0) {
             mhi_motion_targets(c, i, p->ocp);
-            status = mhi_motion_guess(c, i, f->n_x, f->n_u, p->s.x + (ptrdiff_t)m->first * f->n_x,
+            status = mhi_motion_guess(c, i, mhi_ocp_n_x(p->ocp), f->n_x, f->n_u,
+                                      p->s.x + (ptrdiff_t)m->first * f->n_x,
                                       p->s.u + (ptrdiff_t)m->first * f->n_u, err);
         }
     }
@@ -310,7 +312,9 @@ static mhe_status start_problem(mhi_calibration *c, problem *p, mhe_error *err) 
         status = mhi_junction_create(p->system, c->place, &c->arena, &junction, err);
     }
     if (status == MHE_OK) {
+        junction.n_all = f->n_x;
         start_junctions(c, p, &junction);
+        status = mhi_ocp_carry(p->ocp, p->s.x, p->s.u, err);
     }
     for (int32_t i = 0; i < c->n; i++) {
         p->s.p[i] = c->setup.list[i].start;

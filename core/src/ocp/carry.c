@@ -34,23 +34,46 @@ void mhi_ocp_spread_carried(const mhi_ocp *ocp, const mhi_ocp_worker *w,
     }
 }
 
+/* Nothing was before node k: the problem begins there, or a motion of several. */
+static int32_t is_first(const mhi_ocp *ocp, int32_t k) {
+    const int32_t *place = ocp->junction.place;
+    return k == 0 ? ocp->begins : place != NULL && place[k - 1] >= 0;
+}
+
 void mhi_ocp_read_carried(const mhi_ocp *ocp, int32_t k, const double *x, double *y) {
+    const int32_t first = is_first(ocp, k);
     for (int32_t i = MHI_N_SIGNALS; i < 2 * MHI_N_SIGNALS; i++) {
         const mhi_signal *m = &ocp->signals.signal[i];
         const double *from = x + m->column - ocp->face.n_u;
         for (int32_t j = 0; j < m->n_y; j++) {
-            y[m->offset + j] = k == 0 && ocp->begins ? NAN : m->scale * from[j];
+            y[m->offset + j] = first ? NAN : m->scale * from[j];
         }
     }
 }
 
-/* m_{k+1} = y(x_k, u_k) and its rows of A and B [n_x_next of face.n_x]; A NULL: not wanted. */
+/* A row of P: an entry by the parameters, over its usual size. */
+static void carry_by_p(const mhi_by_parameter *by, double scale, int32_t n_p, double *row) {
+    memset(row, 0, sizeof *row * (size_t)n_p);
+    for (int32_t i = 0; i < n_p && by->row != NULL; i++) {
+        row[i] = by->row[i] / scale;
+    }
+    for (int32_t i = 0; i < by->n && by->row == NULL; i++) {
+        row[by->at[i]] += by->by[i] / scale;
+    }
+}
+
+/* m_{k+1} = y(x_k, u_k), where parameters are estimated as it is measured, and its rows of A, B and
+ * P [n_x_next of face.n_x]; A NULL: not wanted. */
 static mhe_status carry(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
-                        const double *u, double *next, double *A, double *B, mhe_error *err) {
-    const int32_t n_x = ocp->face.n_x, n_u = ocp->face.n_u;
+                        const double *u, double *next, double *A, double *B, double *P,
+                        mhe_error *err) {
+    const int32_t n_x = ocp->face.n_x, n_u = ocp->face.n_u, estimated = ocp->estimated != NULL;
     mhe_status status = MHE_OK;
     if (!w->linearised) {
         status = mhi_ocp_measure(ocp, w, k, ocp->carried, x, u, A != NULL, err);
+        status = status == MHE_OK && estimated
+                     ? mhi_ocp_measure_estimated(ocp, w, k, ocp->carried, x, u, A != NULL, err)
+                     : status;
     }
     for (int32_t i = 0; i < MHI_N_SIGNALS && status == MHE_OK; i++) {
         const mhi_signal *s = &ocp->signals.signal[i];
@@ -65,8 +88,12 @@ static mhe_status carry(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const 
             memset(B + row * n_u, 0, sizeof(double) * (size_t)n_u);
             const int32_t first = s->n_columns == 0 ? s->column + j : s->column;
             const double *block = w->jacobian + s->jacobian + j * s->n_columns;
+            const double slope = estimated ? w->by[s->offset + j].slope : 1;
+            if (P != NULL) {
+                carry_by_p(&w->by[s->offset + j], m->scale, ocp->face.n_p, P + row * ocp->face.n_p);
+            }
             for (int32_t c = 0; c < (s->n_columns == 0 ? 1 : s->n_columns); c++) {
-                const double d = (s->n_columns == 0 ? 1 : block[c]) / m->scale;
+                const double d = (s->n_columns == 0 ? slope : block[c]) / m->scale;
                 *(first + c < ocp->n_x ? A + row * n_x + first + c
                                        : B + row * n_u + first + c - ocp->n_x) = d;
             }
@@ -102,14 +129,15 @@ mhe_status mhi_ocp_step(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, double
         if (out->A != NULL) {
             widen(ocp, w, out->A, out->B);
         }
-        status = carry(ocp, w, k, x, u, out->x_next, out->A, out->B, err);
+        status = carry(ocp, w, k, x, u, out->x_next, out->A, out->B, out->P, err);
     }
     return status;
 }
 
 mhe_status mhi_ocp_carry_on(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
                             const double *u, double *x_next, mhe_error *err) {
-    return ocp->signals.n_carried > 0 ? carry(ocp, w, k, x, u, x_next, NULL, NULL, err) : MHE_OK;
+    return ocp->signals.n_carried > 0 ? carry(ocp, w, k, x, u, x_next, NULL, NULL, NULL, err)
+                                      : MHE_OK;
 }
 
 void mhi_ocp_set_begins(mhi_ocp *ocp, int32_t begins) {
@@ -128,9 +156,13 @@ mhe_status mhi_ocp_carry(mhi_ocp *ocp, double *x, const double *u, mhe_error *er
     }
     ocp->workers[0].linearised = 0;
     for (int32_t k = 0; k < ocp->face.n_intervals && ocp->n_x < n_x && status == MHE_OK; k++) {
-        status =
-            carry(ocp, &ocp->workers[0], k, x + (ptrdiff_t)k * n_x,
-                  u + (ptrdiff_t)k * ocp->face.n_u, x + (ptrdiff_t)(k + 1) * n_x, NULL, NULL, err);
+        double *next = x + (ptrdiff_t)(k + 1) * n_x;
+        if (ocp->junction.place != NULL && ocp->junction.place[k] >= 0) {
+            memset(next + ocp->n_x, 0, sizeof *next * (size_t)(n_x - ocp->n_x));
+            continue;
+        }
+        status = carry(ocp, &ocp->workers[0], k, x + (ptrdiff_t)k * n_x,
+                       u + (ptrdiff_t)k * ocp->face.n_u, next, NULL, NULL, NULL, err);
     }
     return status;
 }

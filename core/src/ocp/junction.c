@@ -25,6 +25,7 @@ mhe_status mhi_junction_create(const mhi_system *system, const int32_t *place, m
     n_dense = f->n_x - n_diagonal;
     *j = (mhi_junction){.n = (n_dense + f->n_u - 1) / f->n_u + (n_diagonal > 0),
                         .n_x = f->n_x,
+                        .n_all = f->n_x,
                         .n_u = f->n_u,
                         .place = place};
     j->control = MHI_TAKE(arena, int32_t, j->n * f->n_x);
@@ -48,20 +49,22 @@ mhe_status mhi_junction_create(const mhi_system *system, const int32_t *place, m
 void mhi_junction_step(const mhi_junction *j, int32_t number, const double *x, const double *u,
                        int32_t n_p, const mhe_stage_values *out) {
     const int32_t n_x = j->n_x, n_u = j->n_u, *control = j->control + number * n_x;
+    const int32_t n_all = j->n_all;
     if (out->A != NULL) {
-        memset(out->A, 0, sizeof(double) * (size_t)(n_x * n_x));
-        memset(out->B, 0, sizeof(double) * (size_t)(n_x * n_u));
+        memset(out->A, 0, sizeof(double) * (size_t)(n_all * n_all));
+        memset(out->B, 0, sizeof(double) * (size_t)(n_all * n_u));
     }
     if (out->P != NULL) {
-        memset(out->P, 0, sizeof(double) * (size_t)(n_x * n_p));
+        memset(out->P, 0, sizeof(double) * (size_t)(n_all * n_p));
     }
+    memset(out->x_next + n_x, 0, sizeof(double) * (size_t)(n_all - n_x));
     for (int32_t i = 0; i < n_x; i++) {
         const int32_t c = control[i];
         out->x_next[i] = c >= 0 ? u[c] : number > 0 ? x[i] : 0;
         if (out->A != NULL && c >= 0) {
             out->B[i * n_u + c] = 1;
         } else if (out->A != NULL && number > 0) {
-            out->A[i * n_x + i] = 1;
+            out->A[i * n_all + i] = 1;
         }
     }
 }
@@ -77,7 +80,7 @@ void mhi_junction_cost(const mhi_junction *j, int32_t number, const double *u,
         memset(out->hess_uu, 0, sizeof(double) * (size_t)(j->n_u * j->n_u));
     }
     if (out->hess_ux != NULL) {
-        memset(out->hess_ux, 0, sizeof(double) * (size_t)(j->n_u * j->n_x));
+        memset(out->hess_ux, 0, sizeof(double) * (size_t)(j->n_u * j->n_all));
     }
     for (int32_t c = 0; c < j->n_u; c++) {
         int32_t sets = 0;

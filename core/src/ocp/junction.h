@@ -17,6 +17,7 @@
 typedef struct mhi_junction {
     int32_t n; /* intervals */
     int32_t n_x, n_u;
+    int32_t n_all;        /* of the problem's state, n_x or more: what is carried is 0 behind it */
     int32_t *control;     /* [n x n_x] that a state is set to in an interval, -1: none */
     const int32_t *place; /* [N] of the problem: which interval of a junction, -1: of a motion */
 } mhi_junction;

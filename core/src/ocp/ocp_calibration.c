@@ -17,14 +17,6 @@ static mhe_status refuse(const mhi_ocp *ocp, int32_t term, const char *why, mhe_
     return status;
 }
 
-static int32_t reads_before(const mhi_term *t) {
-    int32_t before = 0;
-    for (int32_t s = 0; s < t->n_signals; s++) {
-        before |= t->layout.at[s] == MHE_AT_PREVIOUS;
-    }
-    return before;
-}
-
 mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     const uint32_t reactions = ((1u << MHI_MAX_REACTIONS) - 1) << MHI_SIGNAL_REACTION;
     mhe_status status = MHE_OK;
@@ -33,11 +25,6 @@ mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe
         return MHE_OK;
     }
     ocp->face.low_rank = NULL;
-    for (int32_t i = 0; i < ocp->n_terms; i++) {
-        if (reads_before(&ocp->terms[i])) {
-            return refuse(ocp, i, "the node before: calibration has no place for that", err);
-        }
-    }
     ocp->prior_at = MHI_TAKE(&ocp->arena, const double *, setup->n_intervals + 1);
     if (ocp->prior_at == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
@@ -45,6 +32,7 @@ mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe
     if (setup->junctions != NULL) {
         status =
             mhi_junction_create(setup->system, setup->junctions, &ocp->arena, &ocp->junction, err);
+        ocp->junction.n_all = ocp->face.n_x;
     }
     if (status != MHE_OK || setup->parameters == NULL) {
         return status;
@@ -67,10 +55,10 @@ mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe
 }
 
 mhe_status mhi_ocp_take_parameter_room(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err) {
-    const int32_t n_p = ocp->face.n_p, n_z = ocp->n_x + ocp->face.n_u;
+    const int32_t n_p = ocp->face.n_p, n_z = ocp->face.n_x + ocp->face.n_u;
     w->P = MHI_TAKE(&ocp->arena, double, ocp->n_x *mhi_system_face(ocp->system)->n_p);
     w->room = MHI_TAKE(&ocp->arena, double, mhi_parameters_room(ocp->system, n_p));
-    w->by = MHI_TAKE(&ocp->arena, mhi_by_parameter, ocp->signals.n_y);
+    w->by = MHI_TAKE(&ocp->arena, mhi_by_parameter, ocp->signals.n_y + ocp->signals.n_carried);
     w->by_p = (mhi_term_by_p){.by = w->by,
                               .n_p = n_p,
                               .row = MHI_TAKE(&ocp->arena, double, n_p),
@@ -81,4 +69,13 @@ mhe_status mhi_ocp_take_parameter_room(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_erro
                    !w->by_p.pp
                ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                : MHE_OK;
+}
+
+mhe_status mhi_ocp_measure_estimated(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k,
+                                     uint32_t wanted, const double *x, const double *u,
+                                     int32_t derivatives, mhe_error *err) {
+    return mhi_parameters_measure(&ocp->parameters, &ocp->signals, ocp->system, w->system, wanted,
+                                  k, x, u, ocp->targets + (ptrdiff_t)k * ocp->signals.n_y, w->room,
+                                  w->y, derivatives ? w->jacobian : NULL,
+                                  derivatives ? w->by : NULL, err);
 }

@@ -76,6 +76,10 @@ mhe_status mhi_ocp_set_parameters(const mhe_stage_problem *problem, const double
 
 /* ocp_calibration.c: what is estimated; MHE_E_CONFIG: a cost that has no place there. */
 mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err);
+/* The signals in `wanted` as they are measured, with their derivatives by parameters. */
+mhe_status mhi_ocp_measure_estimated(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k,
+                                     uint32_t wanted, const double *x, const double *u,
+                                     int32_t derivatives, mhe_error *err);
 /* A worker's, for the parameters. */
 mhe_status mhi_ocp_take_parameter_room(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err);
 

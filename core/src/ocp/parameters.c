@@ -262,7 +262,7 @@ mhe_status mhi_parameters_measure(const mhi_parameters *s, const mhi_signals *si
                                   uint32_t wanted, int32_t k, const double *x, const double *u,
                                   const double *targets, double *room, double *y, double *jacobian,
                                   mhi_by_parameter *by, mhe_error *err) {
-    for (int32_t i = 0; i < signals->n_y && by != NULL; i++) {
+    for (int32_t i = 0; i < signals->n_y + signals->n_carried && by != NULL; i++) {
         by[i] = (mhi_by_parameter){.slope = 1};
     }
     if (wanted >> s->control & 1) {

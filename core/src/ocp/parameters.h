@@ -75,9 +75,9 @@ mhe_status mhi_parameters_create(const mhi_parameters_setup *setup, const mhi_sy
 mhe_status mhi_parameters_set(mhi_parameters *parameters, mhi_system *system, const double *p,
                               mhe_error *err);
 /* The signals `wanted` of node k in y as they are measured (EMG whose target of `targets` [n_y],
- * may be NULL, is missing stays the control itself: its gain says nothing), and `by` [n_y] of them
- * (NULL: not wanted); jacobian as of mhi_signals_evaluate, changed where markers' offsets turn with
- * their bodies. [hot] */
+ * may be NULL, is missing stays the control itself: its gain says nothing), and `by` [n_y +
+ * n_carried] of them (NULL: not wanted); jacobian as of mhi_signals_evaluate, changed where
+ * markers' offsets turn with their bodies. [hot] */
 mhe_status mhi_parameters_measure(const mhi_parameters *parameters, const mhi_signals *signals,
                                   const mhi_system *system, mhi_system_context *context,
                                   uint32_t wanted, int32_t k, const double *x, const double *u,

@@ -115,14 +115,18 @@ static void add_parameter_prior(const mhi_ocp *ocp, mhi_term_sum *sum) {
 
 static void spread_parameters(const mhi_ocp *ocp, const mhi_ocp_worker *w, int32_t n_z,
                               const mhe_stage_values *out) {
-    const int32_t n_p = ocp->face.n_p, n_x = ocp->n_x, n_u = n_z - n_x;
+    const int32_t n_p = ocp->face.n_p, n_x = ocp->n_x, n_all = ocp->face.n_x;
+    const int32_t n_u = n_z > n_x ? ocp->face.n_u : 0, n_carried = n_all - n_x;
     const mhi_term_by_p *by = &w->by_p;
     for (int32_t i = 0; i < n_p; i++) {
         if (out->grad_p != NULL) {
             out->grad_p[i] = by->gradient[i];
         }
         if (out->hess_px != NULL) {
-            memcpy(out->hess_px + i * n_x, by->pz + i * n_z, sizeof(double) * (size_t)n_x);
+            double *to = out->hess_px + i * n_all;
+            memcpy(to, by->pz + i * n_z, sizeof(double) * (size_t)n_x);
+            memcpy(to + n_x, by->pz + (i + 1) * n_z - n_carried,
+                   sizeof(double) * (size_t)n_carried);
         }
         if (out->hess_pu != NULL && n_u > 0) {
             memcpy(out->hess_pu + i * n_u, by->pz + i * n_z + n_x, sizeof(double) * (size_t)n_u);
@@ -148,10 +152,7 @@ mhe_status mhi_ocp_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const 
     mhi_ocp_read_carried(ocp, k, x, w->y);
     mhi_term_sum sum = {0};
     if (ocp->estimated != NULL) {
-        status = mhi_parameters_measure(
-            &ocp->parameters, &ocp->signals, ocp->system, w->system, ocp->wanted, k, x, u,
-            ocp->targets + (ptrdiff_t)k * ocp->signals.n_y, w->room, w->y,
-            derivatives ? w->jacobian : NULL, derivatives ? w->by : NULL, err);
+        status = mhi_ocp_measure_estimated(ocp, w, k, ocp->wanted, x, u, derivatives, err);
         if (status != MHE_OK) {
             return status;
         }
@@ -199,7 +200,7 @@ mhe_status mhi_ocp_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const 
 
 mhe_status mhi_ocp_junction_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const double *x,
                                  const double *u, const mhe_stage_values *out, mhe_error *err) {
-    const int32_t number = ocp->junction.place[k], n_x = ocp->n_x, n_p = ocp->face.n_p;
+    const int32_t number = ocp->junction.place[k], n_x = ocp->face.n_x, n_p = ocp->face.n_p;
     mhe_status status = MHE_OK;
     mhe_stage_values own = *out;
     own.grad_u = own.hess_ux = own.hess_uu = own.hess_pu = NULL;
