@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#define LATEST 0.3      /* s that a force may follow its EMG, and more than any does */
 #define BEYOND 2.0      /* of the MVC: fast motions reach 1.5 */
 #define BELOW (-0.05)   /* a filter may swing below 0 */
 #define RAW_SHARE 0.1   /* of the samples are below 0: an alternating signal */
@@ -279,6 +280,13 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
         return MHE_OK;
     }
     const char *path = run->data.emg;
+    const double late = run->data.emg_delay / r->rate;
+    if (late > LATEST) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "it counts frames, not ms; EMG comes 20 to 100 ms before the force",
+                         "data.emg_delay: %d frames are %.3g s, in a recording of %.3g s",
+                         (int)run->data.emg_delay, late, (r->n_frames - 1) / r->rate);
+    }
     channel *all = calloc((size_t)d->n_muscles + 1, sizeof *all);
     if (all == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");

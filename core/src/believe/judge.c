@@ -64,12 +64,13 @@ static void judge_solves(const mhi_diagnosis *d, const char *unmet, mhi_findings
 static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
     const mhe_estimator_info *f = d->info;
     double *each = malloc(sizeof *each * ((size_t)f->n_markers + 1)), squares = 0;
-    int32_t n = 0, n_seen = 0;
+    int32_t n = 0, n_seen = 0, far = 0;
     for (int32_t i = 0; i < f->n_markers && each != NULL; i++) {
         if (d->markers[i].n > 0) {
             each[n_seen++] = mhi_tally_rms(&d->markers[i]);
             squares += d->markers[i].squares;
             n += d->markers[i].n;
+            far = mhi_tally_rms(&d->markers[i]) > mhi_tally_rms(&d->markers[far]) ? i : far;
         }
     }
     if (n_seen == 0) {
@@ -81,7 +82,8 @@ static void judge_markers(const mhi_diagnosis *d, mhi_findings *findings) {
     if (all > MARKERS_FAR) {
         mhi_findings_add(findings, all > MARKERS_LOST ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL,
                          "is the model scaled to this person, do labels and markers' places agree?",
-                         "the markers are %.1f mm from the estimate (RMS)", 1e3 * all);
+                         "the markers are %.1f mm from the estimate (RMS); farthest %s, %.1f mm",
+                         1e3 * all, f->marker_names[far], 1e3 * mhi_tally_rms(&d->markers[far]));
     }
     const mhi_stretch *w = &d->worst;
     const double part = w->n > 0 ? sqrt(w->squares / w->n) : 0;
