@@ -127,13 +127,11 @@ static mhe_status drop_equal(mhi_table_reader *reader) {
     return MHE_OK;
 }
 
-#define UNEVEN 1.5     /* times the least step: the largest of uneven times */
-#define SCATTER 0.35   /* of a step, RMS about the grid: more is no clock's jitter */
-#define SHIFTED 0.15   /* of a step that a third of the recording is beside the rest: a frame lost \
-                        */
-#define JITTER_ROWS 20 /* fewer tell nothing of a grid */
-#define OPPOSED \
-    (-0.25) /* correlation of neighbouring steps; jitter alone makes -0.5, real times 1 */
+#define UNEVEN 1.5      /* times the least step: the largest of uneven times */
+#define SCATTER 0.35    /* of a step, RMS about the grid: more is no clock's jitter */
+#define SHIFTED 0.15    /* of a step that a third of the rows is beside the rest: a lost frame */
+#define JITTER_ROWS 20  /* fewer tell nothing of a grid */
+#define OPPOSED (-0.25) /* correlation of neighbouring steps; jitter makes -0.5 */
 
 /* Steps that are short where the one before was long: samples stamped late, not taken late. */
 static int32_t steps_alternate(const mhi_table *table) {
