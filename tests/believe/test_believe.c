@@ -272,6 +272,34 @@ static void emg_of_an_amplifier_alone(void **state) {
     free_rig(r);
 }
 
+static void emg_of_another_model(void **state) {
+    (void)state;
+    mhe_description larger = believe_model;
+    for (int32_t found = 1; found <= 2; found++) {
+        rig *r = new_rig();
+        mhe_muscle muscles[5] = {
+            {.name = "A"}, {.name = "B"}, {.name = "C"}, {.name = "D"}, {.name = "E"}};
+        double emg[FRAMES * 5];
+        for (int k = 0; k < FRAMES; k++) {
+            for (int i = 0; i < 5; i++) {
+                emg[5 * k + i] = i < found ? r->emg[k * MUSCLES + i] : NAN;
+            }
+        }
+        larger.n_muscles = 5;
+        larger.muscles = muscles;
+        r->recording.emg = emg;
+        r->recording.n_emg_found = found;
+        r->recording.n_emg_columns = 6;
+        assert_int_equal(mhi_believe_emg(&r->run, &larger, &r->recording, &r->findings, &r->err),
+                         MHE_OK);
+        assert_int_equal(r->findings.n, found == 1);
+        if (found == 1) {
+            expect(r, MHI_FINDING_DOUBTFUL, "of 6 columns 1 are muscles of the model, which has 5");
+        }
+        free_rig(r);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sound_data_give_no_finding),
@@ -285,6 +313,7 @@ int main(void) {
         cmocka_unit_test(markers_that_jump_together),
         cmocka_unit_test(gaps_that_hide_themselves),
         cmocka_unit_test(emg_of_an_amplifier_alone),
+        cmocka_unit_test(emg_of_another_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -24,6 +24,7 @@
 #define REST_CHANNELS 3 /* of so many and more one rests at times */
 #define LINE 0.97       /* share of the squares that one straight line explains */
 #define RISE 0.05       /* of the MVC along it: less moves no force */
+#define FEW 4           /* times as many columns, and muscles, are without the other */
 #define MANY 6          /* of so many and more one rests nearly always; else ... */
 #define TENSE 0.25      /* ... in that share of the frames all have something in common */
 
@@ -310,6 +311,18 @@ static void check_overlap(const char *path, const mhi_recording *r, int32_t n_m,
     }
 }
 
+/* A name or two that two models share; files with other signals hold more of this one's. */
+static void check_names(const char *path, const mhi_recording *r, int32_t n_m,
+                        mhi_findings *findings) {
+    const int32_t found = r->n_emg_found;
+    if (found > 0 && FEW * found < r->n_emg_columns && FEW * found < n_m) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "EMG of another model? data.labels, or emg.channels, say which is which",
+                         "%s: of %d columns %d are muscles of the model, which has %d", path,
+                         (int)r->n_emg_columns, (int)found, (int)n_m);
+    }
+}
+
 /* Which costs want EMG is known of those that say so in their id. */
 static int32_t wants_emg(const mhi_run *run) {
     for (int32_t i = 0; i < run->n_costs; i++) {
@@ -352,6 +365,7 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
         check_drift(path, d, r, findings);
         check_peak(path, run, r, findings);
         check_rest(path, d, r, all, findings);
+        check_names(path, r, d->n_muscles, findings);
         check_overlap(path, r, d->n_muscles, findings);
     }
     free(all);

@@ -19,6 +19,8 @@
 #define FAR_SHARE 0.05 /* of the samples with a force */
 #define NEARER 0.15    /* m by which another body's markers are nearer ... */
 #define MOSTLY 0.5     /* ... in that share of the samples */
+#define SLOWEST 0.5    /* s between rows: nobody walks so slowly */
+#define MANY_ROWS 20   /* a weight that is held may have few */
 #define LEVER 20.0     /* N m, of a small force with such a point */
 #define UNLOADED 0.15  /* share of the largest force below which a plate may be unloaded */
 #define REST_SHARE 0.1 /* of the samples: so long a plate must be unloaded to judge its zero */
@@ -259,6 +261,17 @@ static void check_zero(const view *v, int32_t l) {
     }
 }
 
+/* Feet that step over half an hour. */
+static void check_times(const view *v) {
+    const int32_t n = v->loads->n_rows;
+    const double step = n > MANY_ROWS ? (v->loads->time[n - 1] - v->loads->time[0]) / (n - 1) : 0;
+    if (step > SLOWEST) {
+        mhi_findings_add(v->findings, MHI_FINDING_USELESS,
+                         "are its times in ms instead of s? Divide them by 1000",
+                         "%s: the loads' rows are %.4g s apart", v->run->data.external_loads, step);
+    }
+}
+
 /* Whether the model's own weight is to be carried: it can move along two axes at least. */
 static int32_t is_free(const mhe_description *d) {
     int32_t n = 0;
@@ -284,6 +297,7 @@ mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *d, const
         v.up[i] = -d->gravity[i] / g;
     }
     if (status == MHE_OK && g > 0 && v.weight > MUCH && is_free(d)) { /* a person, not a limb */
+        check_times(&v);
         check_direction(&v);
         for (int32_t l = 0; l < v.loads->n_loads; l++) {
             const int32_t told = findings->n;

@@ -11,8 +11,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define PARTS 3     /* force, point, torque */
-#define SLOWEST 2.0 /* Hz: slower loads are none, as slower frames are not */
+#define PARTS 3 /* force, point, torque */
 
 /* First: its address is that of the whole. */
 typedef struct owned_loads {
@@ -158,15 +157,7 @@ static mhe_status read_table(reader *r, xmlNode *loads, xmlNode *first) {
     const char *slash = strrchr(r->path, '/');
     const int folder = name[0] == '/' || slash == NULL ? 0 : (int)(slash - r->path + 1);
     const char *path = mhi_arena_format(&r->o.b.arena, "%.*s%s", folder, r->path, name);
-    const mhe_status status = path == NULL ? no_memory(r) : mhi_sto_read(path, &r->table, r->err);
-    const mhi_table *t = r->table;
-    if (status == MHE_OK && t->rate > 0 && t->rate < SLOWEST && t->n_rows > 2) {
-        return mhe_fail(r->err, MHE_E_INPUT,
-                        "%s:%d: rows are %.6g s apart (%.6g Hz): are its times in ms instead of s? "
-                        "They must be %.6g s apart then",
-                        t->path, (int)t->line, 1 / t->rate, t->rate, 1e-3 / t->rate);
-    }
-    return status;
+    return path == NULL ? no_memory(r) : mhi_sto_read(path, &r->table, r->err);
 }
 
 static mhe_status take_values(reader *r) {
