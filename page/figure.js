@@ -13,7 +13,8 @@ function prepareFigure() {
   const n = paths.n;
   body = { bones: points("skeleton"), paths, pieces, marks: points("markers"), seen: points("markers_measured"), x: new Float32Array(n), y: new Float32Array(n) };
 }
-const paper = () => { pen = sheet(fig, pen ? pen.g : fig.getContext("2d", { alpha: false, desynchronized: true })); };
+const blank = () => { pen.g.fillStyle = css("--card"); pen.g.fillRect(0, 0, pen.w, pen.h); }; // its canvas is opaque: else it is black
+const paper = () => { pen = sheet(fig, pen ? pen.g : fig.getContext("2d", { alpha: false, desynchronized: true })); blank(); };
 
 // Turns points about the figure's middle and puts them on the paper.
 const lens = { u: 0, v: 0, z: 2, middle: [0, 0, 0], scale: 1 };
@@ -62,7 +63,7 @@ function dots(g, v, p, r, colour) {
 function figure() {
   if (!pen) paper();
   const { g, w, h } = pen, v = now.values;
-  g.fillStyle = css("--card"); g.fillRect(0, 0, w, h);
+  blank();
   if (!anything || !body || !aim(v, w, h)) return;
   const b = body.bones;
   g.lineCap = "round"; g.strokeStyle = css("--bone"); g.lineWidth = 5; g.beginPath();

@@ -17,6 +17,19 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   plots.clear(); redraw(true);
 });
 
+// From low to high, in words: beside the other end 1e-37 is 0.
+function extent(low, high) {
+  const least = 1e-4 * Math.max(Math.abs(low), Math.abs(high)), short = v => Math.abs(v) < least ? "0" : String(+v.toPrecision(3));
+  return short(low) + " to " + short(high);
+}
+
+// As many of the names as there is room for.
+function fitting(g, text, names, room) {
+  let shown = names.length, all;
+  do all = text + names.slice(0, shown).join(", ") + (shown < names.length ? ", \u2026" : ""); while (g.measureText(all).width > room && --shown > 0);
+  return all;
+}
+
 // What is on the screen; nothing else is drawn.
 const inSight = new Set(), sight = new IntersectionObserver(list => {
   for (const e of list) if (e.isIntersecting) inSight.add(e.target.id); else inSight.delete(e.target.id);
@@ -98,7 +111,8 @@ function plainPlot(box, lines, data, band, o = {}) {
     g.stroke(); g.lineWidth = 1;
   });
   g.fillStyle = css("--soft"); g.font = "12px system-ui, sans-serif";
-  g.fillText(`${+low.toPrecision(3)} to ${+high.toPrecision(3)}; ${+first.toFixed(1)} to ${+last.toFixed(1)} s` + (o.legend === false ? "" : ": " + lines.map(l => l.name).join(", ")), 4, h - 4);
+  const text = `${extent(low, high)}; ${+first.toFixed(1)} to ${+last.toFixed(1)} s`;
+  g.fillText(o.legend === false ? text : fitting(g, text + ": ", lines.map(l => l.name), w - 8), 4, h - 4);
 }
 
 // Lines with times of their own [{ x, y }] on one axis: where a line has no sample it has undefined, where it misses one null.

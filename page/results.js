@@ -16,7 +16,7 @@ const seenOnce = new IntersectionObserver(list => list.forEach(e => { if (e.isIn
 addEventListener("beforeprint", () => { unseen.forEach(drawOnce); drawAll(); });
 function picture(p, group, times, pick) {
   const box = document.createElement("div"), figure = document.createElement("figure"), caption = document.createElement("figcaption"), small = document.createElement("small");
-  small.textContent = ` ${+p.range[0].toPrecision(3)} to ${+p.range[1].toPrecision(3)} ${group.unit}`;
+  small.textContent = ` ${extent(...p.range)} ${group.unit}`;
   caption.append(p.name, small); box.className = "plot low"; figure.append(caption, box);
   box.setAttribute("role", "img"); box.setAttribute("aria-label", `${group.heading}: ${p.name},${small.textContent}`);
   box.show = () => {

@@ -56,9 +56,9 @@ static char *file_text(const char *dir, const char *name) {
     char path[4096];
     const int length = snprintf(path, sizeof path, "%s/%s", dir, name);
     FILE *file = length > 0 && (size_t)length < sizeof path ? fopen(path, "rb") : NULL;
-    char *text = file == NULL ? NULL : calloc(1, 1 << 20);
+    char *text = file == NULL ? NULL : malloc(1 << 20);
     if (text != NULL) {
-        (void)fread(text, 1, (1 << 20) - 1, file);
+        text[fread(text, 1, (1 << 20) - 1, file)] = '\0';
     }
     if (file != NULL) {
         (void)fclose(file);

@@ -21,11 +21,24 @@ static const words_option options[] = {
      .at = AT(vary)},
     {.name = "--repeats",
      .value = "N",
-     .help = "how often each variant runs (5)",
+     .help = "how often each variant runs (5). A frame does the same work each time: with two or "
+             "more, percentiles of the feedback are told for each frame by its median over the "
+             "runs, too, which leaves out what the machine adds",
      .kind = WORDS_INT,
      .at = AT(repeats),
      .low = 1,
      .high = REPEATS_MAX},
+    {.name = "--no-layers",
+     .help = "whole runs alone",
+     .kind = WORDS_FLAG,
+     .at = AT(no_layers),
+     .low = 1},
+    {.name = "--frames",
+     .help = "writes frames.csv, too: preparation and feedback of every estimate in every run (but "
+             "the first, which starts from nothing)",
+     .kind = WORDS_FLAG,
+     .at = AT(frames),
+     .low = 1},
     {.name = "--scale",
      .help = "no CONFIG: how a frame's time grows with coordinates (7 to 37) and muscles (20 to "
              "150), on models that are made up in DIR, ./out/scale unless given",
@@ -46,7 +59,7 @@ const words_program arguments_program = {
                "alternation.",
     .usage =
         "  mhe-bench CONFIG.yaml [--set path.to.key=value]... [--vary path.to.key=v1,v2,v3]...\n"
-        "            [--repeats N] [--quick] [--out DIR]\n"
+        "            [--repeats N] [--no-layers] [--frames] [--quick] [--out DIR]\n"
         "  mhe-bench --scale [--set path.to.key=value]... [--repeats N] [--quick] [--out DIR]\n"
         "  mhe-bench --version | --help\n",
     .notes = "Layers are timed once for all windows. Exit status: 0 done; 1 a run failed; 2 the\n"

@@ -9,6 +9,8 @@ typedef struct arguments {
     int32_t mode; /* 1: --scale */
     int32_t scale;
     int32_t quick;
+    int32_t no_layers;
+    int32_t frames;  /* frames.csv is wanted */
     int32_t repeats; /* 0: not given */
     const char *config;
     const char *out; /* NULL: ./out/<config name> */

@@ -137,9 +137,10 @@ static mhe_status prepare_runs(bench *b, mhe_error *err) {
         }
         int32_t taken = 0;
         for (int32_t part = 0; part < N_PARTS; part++) {
-            run->parts[part] =
+            double *all =
                 MHI_TAKE(&b->arena, double, (size_t)repeats *(size_t)run->rig.n_estimates_max);
-            taken += run->parts[part] != NULL;
+            run->parts[part].all = all;
+            taken += all != NULL;
         }
         run->means = MHI_TAKE(&b->arena, double, repeats);
         run->firsts = MHI_TAKE(&b->arena, double, repeats);
@@ -155,7 +156,7 @@ static mhe_status run_once(bench_run *run, int32_t repeat, mhe_error *err) {
     double *parts[N_PARTS], sum = 0;
     int32_t n = 0;
     for (int32_t part = 0; part < N_PARTS; part++) {
-        parts[part] = run->parts[part] + run->n;
+        parts[part] = run->parts[part].all + run->n;
     }
     mhe_status status = rig_run(&run->rig, parts, &n, err);
     if (status != MHE_OK) {
@@ -171,6 +172,7 @@ static mhe_status run_once(bench_run *run, int32_t repeat, mhe_error *err) {
         sum += parts[PART_FRAME][i];
     }
     run->means[repeat] = sum / n;
+    run->n_frames = n; /* in every run */
     run->n += n;
     return MHE_OK;
 }
@@ -187,11 +189,44 @@ static mhe_status measure_runs(bench *b, mhe_error *err) {
 
 /* ---- summing up ---- */
 
+/* `scratch` [n, or n_frames + repeats]. */
+static void sum_up_part(const bench_run *run, int32_t repeats, double *scratch, bench_part *part) {
+    const int32_t n = run->n_frames;
+    double *one = scratch + n; /* [repeats] */
+    for (int32_t i = 0; i < repeats; i++) {
+        memcpy(scratch, part->all + (ptrdiff_t)i * n, sizeof(double) * (size_t)n);
+        const bench_spread of_run = spread_of(scratch, n);
+        one[i] = of_run.p999 / of_run.p50;
+    }
+    measure_sort(one, repeats);
+    part->tail = measure_median(one, repeats);
+    for (int32_t frame = 0; frame < n; frame++) {
+        for (int32_t i = 0; i < repeats; i++) {
+            one[i] = part->all[(ptrdiff_t)i * n + frame];
+        }
+        measure_sort(one, repeats);
+        scratch[frame] = measure_median(one, repeats);
+    }
+    part->by_frame = spread_of(scratch, n);
+    memcpy(scratch, part->all, sizeof(double) * (size_t)run->n);
+    part->spread = spread_of(scratch, run->n);
+}
+
+static int32_t scratch_size(const bench *b) {
+    const int32_t repeats = b->setup->repeats;
+    int32_t most = SAMPLES * repeats;
+    for (int32_t i = 0; i < b->setup->variants->n; i++) {
+        const bench_run *run = &b->runs[i];
+        most = run->n + run->n_frames + repeats > most ? run->n + run->n_frames + repeats : most;
+    }
+    return most;
+}
+
 /* Back to front, since the first of each sort is what the others are compared with and sorting
  * would part the pairs. */
 static mhe_status sum_up(bench *b, mhe_error *err) {
     const int32_t repeats = b->setup->repeats, n = SAMPLES * repeats;
-    double *scratch = MHI_TAKE(&b->arena, double, n);
+    double *scratch = MHI_TAKE(&b->arena, double, scratch_size(b));
     if (scratch == NULL) {
         return no_memory(err);
     }
@@ -208,7 +243,7 @@ static mhe_status sum_up(bench *b, mhe_error *err) {
         bench_run *run = &b->runs[i];
         run->ratio = ratio_of(run->means, b->runs[0].means, repeats, scratch);
         for (int32_t part = 0; part < N_PARTS; part++) {
-            run->spread[part] = spread_of(run->parts[part], run->n);
+            sum_up_part(run, repeats, scratch, &run->parts[part]);
         }
         measure_sort(run->firsts, repeats);
         run->first = measure_median(run->firsts, repeats);

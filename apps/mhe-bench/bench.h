@@ -18,6 +18,15 @@ typedef struct bench_spread {
     double p50, p95, p99, p999, most;
 } bench_spread;
 
+/* One part of the frames' times. A frame does the same work in every run, so its median over the
+ * runs is what the program takes: what the machine adds, it adds to other frames each time. */
+typedef struct bench_part {
+    double *all;           /* [repeats x n_frames] s, run by run */
+    bench_spread spread;   /* of all */
+    bench_spread by_frame; /* of each frame's median over the runs */
+    double tail;           /* p99.9 over p50 of a run, median of the runs */
+} bench_part;
+
 /* Of the times that were taken side by side with those of the first variant. */
 typedef struct bench_ratio {
     double least, median, most;
@@ -37,14 +46,13 @@ typedef struct bench_layer {
 /* Whole runs of one variant. */
 typedef struct bench_run {
     rig rig;
-    double *parts[N_PARTS]; /* [n] s: all estimates of all runs but their first; sorted when
-                             * summed up */
-    int32_t n;
-    double *firsts; /* [repeats] s: first estimate of each run, from a cold start */
-    double *means;  /* [repeats] s: mean time of an estimate but the first in each run */
-    bench_spread spread[N_PARTS];
-    double first; /* s, median */
-    double rate;  /* estimates per second, of the median run */
+    bench_part parts[N_PARTS];
+    int32_t n;        /* estimates of all runs but their first */
+    int32_t n_frames; /* ... of one run */
+    double *firsts;   /* [repeats] s: first estimate of each run, from a cold start */
+    double *means;    /* [repeats] s: mean time of an estimate but the first in each run */
+    double first;     /* s, median */
+    double rate;      /* estimates per second, of the median run */
     bench_ratio ratio;
 } bench_run;
 

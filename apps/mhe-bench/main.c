@@ -34,6 +34,12 @@ static mhe_status write_files(const arguments *a, const bench *b, const mhe_host
     if (status == MHE_OK) {
         status = mhe_outbox_text(outbox, "bench.json", text.data, err);
     }
+    if (status == MHE_OK && a->frames) {
+        text.length = 0;
+        report_frames(b, &text);
+        status = text.failed ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                             : mhe_outbox_text(outbox, "frames.csv", text.data, err);
+    }
     if (status == MHE_OK) {
         status = mhe_outbox_commit(outbox, err);
     }
@@ -56,7 +62,8 @@ static mhe_status measure(const arguments *a, const variants *v, const mhe_host 
                                .repeats = a->repeats > 0 ? a->repeats
                                           : a->quick     ? QUICK_REPEATS
                                                          : REPEATS,
-                               .estimates = a->quick ? QUICK_ESTIMATES : 0};
+                               .estimates = a->quick ? QUICK_ESTIMATES : 0,
+                               .no_layers = a->no_layers};
     bench *b = malloc(sizeof *b);
     if (b == NULL) {
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
@@ -83,8 +90,12 @@ static mhe_status run(const arguments *a, const mhe_host *host, mhe_error *err) 
     if (status != MHE_OK) {
         return status;
     }
-    if (a->mode == 1) {
+    if (a->mode == 1 && (a->frames || a->vary.n > 0)) {
+        status = mhe_fail(err, MHE_E_ARGUMENT, "--vary and --frames go with a config file");
+    } else if (a->mode == 1) {
         status = scale_measure(a, registry, host, err);
+    }
+    if (a->mode == 1) {
         mhi_registry_free(registry);
         return status;
     }

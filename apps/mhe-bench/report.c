@@ -11,7 +11,7 @@
 /* ---- terminal ---- */
 
 static int width_of_names(const variants *v) {
-    size_t width = strlen("whole frames");
+    size_t width = strlen("feedback by frame, ms");
     for (int32_t i = 0; i < v->n; i++) {
         const size_t length = strlen(v->list[i].name);
         width = length > width ? length : width;
@@ -53,7 +53,7 @@ static void add_runs(const bench *b, mhi_text *out) {
                  b->runs[0].rig.has_rmse ? "   q deg   force N" : "");
     for (int32_t i = 0; i < v->n; i++) {
         const bench_run *run = &b->runs[i];
-        const bench_spread *s = &run->spread[PART_FRAME];
+        const bench_spread *s = &run->parts[PART_FRAME].spread;
         const rig *r = &run->rig;
         mhi_text_add(out, "%-*s %8.1f %8.3f %8.3f %8.3f %8.3f %8.3f %7.2f", width, v->list[i].name,
                      run->rate, 1e3 * s->p50, 1e3 * s->p95, 1e3 * s->p99, 1e3 * s->most,
@@ -74,12 +74,33 @@ static void add_parts(const bench *b, mhi_text *out) {
                  "prepare p50", "feedback p50", "p95", "p99", "p99.9", "max", "evaluate p50",
                  "rest p50");
     for (int32_t i = 0; i < v->n; i++) {
-        const bench_spread *s = b->runs[i].spread, *f = &s[PART_FEEDBACK];
+        const bench_part *of = b->runs[i].parts;
+        const bench_spread *f = &of[PART_FEEDBACK].spread;
         mhi_text_add(out, "%-*s %11.3f %12.3f %8.3f %8.3f %8.3f %8.3f %12.3f %8.3f\n", width,
-                     v->list[i].name, 1e3 * s[PART_PREPARE].p50, 1e3 * f->p50, 1e3 * f->p95,
-                     1e3 * f->p99, 1e3 * f->p999, 1e3 * f->most, 1e3 * s[PART_EVALUATION].p50,
-                     1e3 * s[PART_REST].p50);
+                     v->list[i].name, 1e3 * of[PART_PREPARE].spread.p50, 1e3 * f->p50, 1e3 * f->p95,
+                     1e3 * f->p99, 1e3 * f->p999, 1e3 * f->most,
+                     1e3 * of[PART_EVALUATION].spread.p50, 1e3 * of[PART_REST].spread.p50);
     }
+}
+
+/* The slowest frames by the clock and by their own work. */
+static void add_tails(const bench *b, mhi_text *out) {
+    const variants *v = b->setup->variants;
+    const int width = width_of_names(v);
+    mhi_text_add(out, "\n%-*s %13s %8s %8s %8s %8s %13s\n", width, "feedback by frame, ms",
+                 "one run, x", "p50", "p99", "p99.9", "max", "p99.9, x");
+    for (int32_t i = 0; i < v->n; i++) {
+        const bench_part *of = &b->runs[i].parts[PART_FEEDBACK];
+        const bench_spread *f = &of->by_frame;
+        mhi_text_add(out, "%-*s %13.2f %8.3f %8.3f %8.3f %8.3f %13.2f\n", width, v->list[i].name,
+                     of->tail, 1e3 * f->p50, 1e3 * f->p99, 1e3 * f->p999, 1e3 * f->most,
+                     f->p999 / f->p50);
+    }
+    mhi_text_add(out,
+                 "one run, x: p99.9 over p50 of a run's feedback, median of the runs. Then "
+                 "each frame counts with its median of the %d runs: what the program takes, "
+                 "without what the machine adds.\n",
+                 b->setup->repeats);
 }
 
 void report_table(const bench *b, mhi_text *out) {
@@ -87,9 +108,14 @@ void report_table(const bench *b, mhi_text *out) {
     mhi_text_add(out, "%s: %d coordinates, %d muscles, %d markers; %d %s of each variant\n\n",
                  r->info.config_name, r->info.n_q, r->info.n_muscles, r->info.n_markers,
                  b->setup->repeats, b->setup->repeats == 1 ? "run" : "runs, in alternation,");
-    add_layers(b, out);
+    if (b->n_layers > 0) {
+        add_layers(b, out);
+    }
     add_runs(b, out);
     add_parts(b, out);
+    if (b->setup->repeats > 1) {
+        add_tails(b, out);
+    }
     mhi_text_add(
         out,
         "\nx: times the first variant, measured side by side. first: the first estimate of a "
@@ -106,13 +132,14 @@ static void add_number(cJSON *object, const char *key, double value) {
     cJSON_AddNumberToObject(object, key, value);
 }
 
-static void json_spread(cJSON *object, const char *key, const bench_spread *s, double scale) {
+static cJSON *json_spread(cJSON *object, const char *key, const bench_spread *s, double scale) {
     cJSON *o = cJSON_AddObjectToObject(object, key);
     add_number(o, "p50", scale * s->p50);
     add_number(o, "p95", scale * s->p95);
     add_number(o, "p99", scale * s->p99);
     add_number(o, "p99.9", scale * s->p999);
     add_number(o, "max", scale * s->most);
+    return o;
 }
 
 static void json_ratio(cJSON *object, const bench_ratio *r) {
@@ -138,7 +165,7 @@ static void json_layer(cJSON *list, const bench_layer *l) {
     json_setting(o, l->rig);
     add_number(o, "samples", l->n);
     add_number(o, "calls_per_sample", l->calls);
-    json_spread(o, "us", &l->spread, 1e6);
+    (void)json_spread(o, "us", &l->spread, 1e6);
     json_ratio(o, &l->ratio);
 }
 
@@ -160,7 +187,10 @@ static void json_run(cJSON *list, const bench_run *run) {
                                               [PART_EVALUATION] = "feedback_evaluation_ms",
                                               [PART_REST] = "feedback_rest_ms"};
     for (int32_t part = 0; part < N_PARTS; part++) {
-        json_spread(o, keys[part], &run->spread[part], 1e3);
+        const bench_part *of = &run->parts[part];
+        cJSON *times = json_spread(o, keys[part], &of->spread, 1e3);
+        add_number(times, "p99.9_over_p50_of_a_run", of->tail);
+        (void)json_spread(times, "by_frame", &of->by_frame, 1e3);
     }
     add_number(o, "first_frame_ms", 1e3 * run->first);
     json_ratio(o, &run->ratio);
@@ -198,4 +228,19 @@ mhe_status report_json(const bench *b, const char *config, mhi_text *out, mhe_er
     mhi_text_add(out, "%s\n", text);
     cJSON_free(text);
     return MHE_OK;
+}
+
+/* ---- frames.csv ---- */
+
+void report_frames(const bench *b, mhi_text *out) {
+    mhi_text_add(out, "variant,run,estimate,prepare_ms,feedback_ms,feedback_evaluation_ms\n");
+    for (int32_t i = 0; i < b->setup->variants->n; i++) {
+        const bench_run *run = &b->runs[i];
+        for (int32_t j = 0; j < run->n; j++) {
+            mhi_text_add(
+                out, "%d,%d,%d,%.6f,%.6f,%.6f\n", (int)(i + 1), (int)(j / run->n_frames + 1),
+                (int)(j % run->n_frames + 2), 1e3 * run->parts[PART_PREPARE].all[j],
+                1e3 * run->parts[PART_FEEDBACK].all[j], 1e3 * run->parts[PART_EVALUATION].all[j]);
+        }
+    }
 }

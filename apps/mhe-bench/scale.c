@@ -96,10 +96,16 @@ static mhe_status time_tree(const arguments *a, const char *folder, mhi_registry
     }
     if (status == MHE_OK) {
         const bench_run *run = &b->runs[0];
-        const bench_spread *s = run->spread;
-        *r = (row){run->rig.info.n_q, run->rig.info.n_muscles, s[PART_FRAME].p50,
-                   s[PART_FRAME].p99, s[PART_PREPARE].p50,     s[PART_EVALUATION].p50,
-                   s[PART_REST].p50,  run->rig.rmse.force};
+        const bench_part *of = run->parts;
+        const bench_spread *s = &of[PART_FRAME].spread;
+        *r = (row){run->rig.info.n_q,
+                   run->rig.info.n_muscles,
+                   s->p50,
+                   s->p99,
+                   of[PART_PREPARE].spread.p50,
+                   of[PART_EVALUATION].spread.p50,
+                   of[PART_REST].spread.p50,
+                   run->rig.rmse.force};
     }
     bench_free(b);
     variants_free(&v);

@@ -243,7 +243,7 @@ static mhe_status tell(arguments *a, mhi_calibration *c, mhe_error *err) {
     if (status == MHE_OK) {
         status = write_report(&r, out.data, err);
     }
-    if (status == MHE_OK && r.findings.length > 0 && !a->quiet) {
+    if (status == MHE_OK && r.findings.length > 0) {
         (void)fputs(r.findings.data, stderr);
     }
     if (status == MHE_OK) {

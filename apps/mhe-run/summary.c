@@ -8,6 +8,7 @@
 #include <cJSON.h>
 #include <math.h>
 #include <mhe/library.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* Of the sorted solve times, ms. */
@@ -192,6 +193,52 @@ static void add_peaks(cJSON *root, const summary *s) {
     }
 }
 
+mhe_status summary_take_offsets(summary *s, const mhe_estimator *estimator, mhe_error *err) {
+    double *offsets = malloc(sizeof *offsets * (3 * (size_t)s->info.n_markers + 1));
+    if (offsets == NULL) {
+        return mhe_fail(err, MHE_E_MEMORY, "out of memory");
+    }
+    free(s->marker_offsets);
+    s->marker_offsets = offsets;
+    if (!mhe_estimator_marker_offsets(estimator, offsets)) {
+        s->marker_offsets = NULL;
+        free(offsets);
+    }
+    return MHE_OK;
+}
+
+static double length(const double *v) {
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+/* How far markers are from their places in their segments, mm along the axes of their bodies. */
+static void add_marker_offsets(cJSON *root, const summary *s) {
+    cJSON *all = s->marker_offsets != NULL ? cJSON_AddObjectToObject(root, "marker_offsets") : NULL;
+    for (int32_t i = 0; i < s->info.n_markers && all != NULL; i++) {
+        double mm[3];
+        for (int32_t j = 0; j < 3; j++) {
+            mm[j] = 1e3 * s->marker_offsets[3 * i + j];
+        }
+        cJSON_AddItemToObject(all, s->info.marker_names[i], cJSON_CreateDoubleArray(mm, 3));
+    }
+}
+
+static void offsets_line(const summary *s, mhi_text *out) {
+    const int32_t n = s->info.n_markers;
+    double squares = 0;
+    int32_t most = 0;
+    for (int32_t i = 0; i < n; i++) {
+        squares += pow(length(s->marker_offsets + 3 * i), 2);
+        most = length(s->marker_offsets + 3 * i) > length(s->marker_offsets + 3 * most) ? i : most;
+    }
+    const double *v = s->marker_offsets + 3 * most;
+    mhi_text_add(out,
+                 "markers are %.1f mm from their places (RMS, learnt); farthest %s: %.1f mm (%.1f, "
+                 "%.1f, %.1f along the axes of its body); all in summary.json\n",
+                 1e3 * sqrt(squares / n), s->info.marker_names[most], 1e3 * length(v), 1e3 * v[0],
+                 1e3 * v[1], 1e3 * v[2]);
+}
+
 mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *err) {
     tally_sort(&s->tally);
     cJSON *root = cJSON_CreateObject();
@@ -231,6 +278,7 @@ mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *
         add_rmse(root, &s->rmse);
     }
     add_peaks(root, s);
+    add_marker_offsets(root, s);
     add_verdict(root, s);
     add_channels(root, s);
     char *text = cJSON_Print(root);
@@ -304,4 +352,7 @@ void summary_lines(const summary *s, mhi_text *out) {
         }
     }
     mhi_text_add(out, strcmp(lead, ", ") == 0 ? "\n" : "");
+    if (s->marker_offsets != NULL) {
+        offsets_line(s, out);
+    }
 }

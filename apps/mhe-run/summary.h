@@ -16,7 +16,8 @@ typedef struct summary {
     int32_t n_pushed;
     tally tally;
     peaks peaks;
-    double elapsed; /* s, whole loop */
+    double *marker_offsets; /* [n_markers x 3] m, learnt by the end; NULL: none are */
+    double elapsed;         /* s, whole loop */
     int32_t has_rmse;
     mhe_rmse rmse;
     const mhe_findings *findings; /* what the verdict follows from, and what was tracked */
@@ -25,6 +26,8 @@ typedef struct summary {
     const live *live;             /* NULL: not by the clock */
 } summary;
 
+/* What the estimator has learnt by now of where markers are. */
+mhe_status summary_take_offsets(summary *s, const mhe_estimator *estimator, mhe_error *err);
 /* summary.json; sorts the solve times. `path` is the config file's. */
 mhe_status summary_json(summary *s, const char *path, mhi_text *out, mhe_error *err);
 /* The verdict first: usable or not, why, and what helps. */

@@ -11,6 +11,7 @@
 
 #include <math.h>
 #include <mhe/library.h>
+#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 
@@ -227,6 +228,9 @@ static mhe_status write_texts(tracking *t, mhe_error *err) {
     t->summary.findings = t->findings;
     t->summary.config = config;
     if (status == MHE_OK) {
+        status = summary_take_offsets(&t->summary, t->estimator, err);
+    }
+    if (status == MHE_OK) {
         status = mhe_findings_judge(t->findings, &t->summary.weight, err);
     }
     if (status == MHE_OK) {
@@ -395,6 +399,7 @@ mhe_status track(const track_setup *setup, mhe_error *err) {
     mhe_estimator_close(t.estimator);
     tally_free(&t.summary.tally);
     peaks_free(&t.summary.peaks);
+    free(t.summary.marker_offsets);
     live_close(&t.live);
     return status;
 }

@@ -19,6 +19,7 @@
 
 #define MOST_SETS 8
 #define MANY_SETS 20 /* of whole recordings with parameters */
+#define MOST_TAIL_SETS 4
 #define MOST_CORRECTIONS 3
 #define NEAR_BOUNDS \
     1e-4 /* of a set that is taken before it settles: multipliers are HOLD times it */
@@ -257,6 +258,62 @@ static void settle(qp *q) {
     }
 }
 
+/* Sets of the tail until one suits it; 0: none did. Its first states are constants meanwhile. */
+static int32_t solve_tail(qp *tail, const qp_limits *limits) {
+    const qp_shape *s = tail->shape;
+    const size_t x = sizeof(double) * (size_t)s->n_x;
+    double *lower = tail->lower + s->n_u, *upper = tail->upper + s->n_u, *kept = tail->rest_x;
+    memcpy(kept, lower, x);
+    memcpy(kept + s->ld_x, upper, x);
+    memset(lower, 0, x);
+    memset(upper, 0, x);
+    memset(tail->fixed + s->n_u, 1, (size_t)s->n_x);
+    look l = {.changes = 1};
+    for (int32_t i = 0; i < MOST_TAIL_SETS && l.changes > 0; i++) {
+        if (!solve_set(tail, limits->regularisation)) {
+            break;
+        }
+        l = see(tail, limits);
+        follow_chains(tail, limits);
+    }
+    memcpy(lower, kept, x);
+    memcpy(upper, kept + s->ld_x, x);
+    memset(tail->fixed + s->n_u, 0, (size_t)s->n_x);
+    return l.changes == 0;
+}
+
+/* Multipliers and sets as they come from the tail, if it comes to any. */
+static void guess_tail(qp *q, const qp_limits *limits) {
+    const int32_t from = active_tail_begins(q);
+    if (from == 0 || q->ahead > KALMAN_LANES) {
+        return;
+    }
+    qp_shape shape;
+    qp tail = active_tail(q, &shape, from);
+    const size_t z = sizeof(double) * size_z(&shape);
+    double *side = q->update.side, *rhs = q->update.w; /* of no set yet */
+    memcpy(side, tail.side, z);
+    memcpy(rhs, tail.rhs, z);
+    /* Its first stages make up for a first state that may be another. */
+    const int32_t known = solve_tail(&tail, limits);
+    const size_t back = known ? sizeof(double) * (size_t)(shape.N / 3 * shape.ld_z) : z;
+    q->tails += known;
+    memcpy(tail.side, side, back);
+    memcpy(tail.rhs, rhs, back);
+    q->solutions += tail.solutions * shape.N / q->shape->N;
+    q->sweeps += tail.sweeps;
+}
+
+/* Bounds ahead of the tail that the first system changed: where there are many, because stages are
+ * close to each other, the tail alone says little of the next program. */
+static void count_ahead(qp *q) {
+    const ptrdiff_t end = (ptrdiff_t)active_tail_begins(q) * q->shape->ld_z;
+    q->ahead = 0;
+    for (ptrdiff_t at = 0; at < end; at++) {
+        q->ahead += q->side[at] != q->update.side[at];
+    }
+}
+
 int32_t active_solve(qp *q, const qp_limits *limits) {
     const qp_shape *s = q->shape;
     const size_t z = sizeof(double) * size_z(s), x = sizeof(double) * size_x(s);
@@ -264,6 +321,7 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
     memcpy(q->fix_lambda, q->lambda, x);
     memset(q->rhs, 0, z);
     guess(q);
+    guess_tail(q, limits);
     int32_t result = QP_LIMIT;
     look l = {0};
     q->update.known = 0;
@@ -290,6 +348,9 @@ int32_t active_solve(qp *q, const qp_limits *limits) {
             active_remember(q);
         }
         follow_chains(q, limits);
+        if (q->iterations == 1) {
+            count_ahead(q);
+        }
         if (!isfinite(l.stationarity + l.feasibility)) {
             break;
         }

@@ -37,6 +37,11 @@ static inline int32_t active_turn(qp *q, ptrdiff_t at, double w, double y, doubl
  * q->w, lambda, and slope at them. */
 void active_follow(qp *q, int32_t j, double crossed, double pulled);
 
+/* active_tail.c: the last stages as a program of their own, in the same memory; `shape` is its own.
+ * 0: the window is too short for it, or has no factors to share. */
+int32_t active_tail_begins(const qp *q);
+qp active_tail(const qp *q, qp_shape *shape, int32_t from);
+
 /* active_update.c: solves the present set's system by the factors of one before, as solve_set()
  * does; 0: they are of no use. */
 int32_t active_update(qp *q);

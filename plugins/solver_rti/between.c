@@ -73,7 +73,7 @@ int32_t rti_between(rti_solver *s, double *share) {
     const size_t z = size_z(shape);
     qp *q = &s->qp;
     const products p =
-        s->last_is_known && s->last_damping == s->damping ? compare(s) : (products){0};
+        s->last_is_known && s->last_damping == s->here.damping ? compare(s) : (products){0};
     *share = p.all > 0 ? p.both / p.all : 0;
     const int32_t turned = p.all > TURN * TURN * p.way && *share >= LEAST_OF_KINK &&
                            *share <= 1 - LEAST_OF_KINK,
@@ -91,7 +91,7 @@ int32_t rti_between(rti_solver *s, double *share) {
     copy_program(s, s->first.w, s->first.lambda, s->first.z_lower, s->first.z_upper, &s->last);
     memcpy(s->before, s->last_from, sizeof(double) * z);
     memcpy(s->last_from, s->here.w, sizeof(double) * z);
-    s->last_damping = s->damping;
+    s->last_damping = s->here.damping;
     s->last_is_known = 1;
     return turned ? RTI_KINK : mixed;
 }

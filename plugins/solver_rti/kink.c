@@ -137,7 +137,7 @@ int32_t rti_step_along_kink(rti_solver *s, double share) {
     if (!close_in(s, way)) {
         return 0;
     }
-    const double damping = s->config->regularisation + s->damping;
+    const double damping = s->config->regularisation + s->held + s->damping;
     find_change(s, way);
     rti_set_damping(s, &s->here, damping);
     rti_set_damping(s, &s->trial, damping);

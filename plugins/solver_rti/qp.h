@@ -76,11 +76,13 @@ typedef struct qp {
     double *side;  /* [size_z] active.c: -1, 1: held at the lower, the upper bound; 0: at none */
     uint8_t *held; /* [size_z] controls and fixed variables that are constants */
     qp_update update;
+    int32_t ahead;    /* bounds ahead of its tail that the last program's first system changed */
     double *because;  /* [ld_x] scratch of active.c */
     uint8_t *turned;  /* [n_x] simple states with bounds, or a control with bounds, that changed */
     int32_t programs; /* solved since qp_place(), and those of them in which no set was found */
     int32_t fallbacks;
     int32_t updates; /* of all these, sets solved by the factors of one before */
+    int32_t tails;   /* programs that began with what their last stages alone had come to */
     /* Of Newton systems, with what their factors take, since that was told (qp_take_work()); and
      * sweeps along chains, many of which make one. */
     int32_t solutions, sweeps;

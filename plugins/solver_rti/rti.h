@@ -94,6 +94,8 @@ typedef struct rti_solver {
     double *weight;                   /* [size_x] of each gap in the merit of this solve */
     double penalty;                   /* the largest of them */
     double damping;                   /* Levenberg's, of the next step */
+    double held;                      /* the same where there is no slope left (search.c) */
+    int32_t on_level;                 /* iterates in a row without one */
     int32_t warm;                     /* the multipliers are worth a start */
     int32_t real_time;                /* this solve goes by full steps */
     double gap_sum;                   /* at `here` */

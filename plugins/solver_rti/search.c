@@ -12,6 +12,8 @@
 /* Part of the least residual so far that a step may leave, whatever its merit. */
 #define NEARER 0.5
 #define MOST_MISSED 12 /* kinks of a solve that are looked for in vain */
+#define LEVEL 0.1      /* part of the tolerance under which a slope is none */
+#define NEAR 1000      /* tolerances from the solution */
 
 /* merit = cost + sum of weight * |gap| */
 static double merit(const rti_solver *s, const rti_point *point) {
@@ -138,6 +140,28 @@ static int32_t second_look(rti_solver *s, double slope) {
     return 0;
 }
 
+/* Where the cost is flat, a program steps as far as its own proximal term lets it, and each step
+ * leaves as large a gap as the last, for the dynamics are not flat: the cost falls by nothing that
+ * can be seen, and nothing converges. Where two iterates in a row, near the solution, had no slope
+ * to speak of, a step as long as the last may bring no more than such a slope: what is flat to the
+ * tolerance is left alone, and the gaps close. */
+static double hold(rti_solver *s) {
+    const rti_residuals *r = &s->residuals;
+    const double level = LEVEL * s->config->tolerance;
+    const int32_t level_here = fmax(r->stationarity, 10 * r->complementarity) <= level &&
+                               rti_excess(r) <= NEAR * s->config->tolerance;
+    s->on_level = level_here ? s->on_level + 1 : 0;
+    double longest = 0;
+    for (size_t i = 0; s->on_level > 1 && i < size_z(&s->shape); i++) {
+        longest = larger(longest, fabs(s->qp.w[i]));
+    }
+    return longest > 0 ? level / longest : 0;
+}
+
+static void set_damping(rti_solver *s) {
+    rti_set_damping(s, &s->here, s->config->regularisation + s->held + s->damping);
+}
+
 /* Shortens the step until the trial point is better; the length, 0: none found. The point is
  * then known with derivatives. */
 static double search(rti_solver *s, double slope) {
@@ -190,7 +214,7 @@ static int32_t step_along_kink(rti_solver *s, double share) {
     s->last_is_known = 0;
     memcpy(s->here.w, s->last_from, sizeof(double) * size_z(&s->shape));
     if (s->failure == MHE_OK && rti_evaluate(s, &s->here, RTI_ALL)) {
-        rti_set_damping(s, &s->here, s->config->regularisation + s->damping);
+        set_damping(s);
     }
     return 0;
 }
@@ -258,8 +282,9 @@ static double try_step(rti_solver *s, int32_t result) {
 }
 
 int32_t rti_step_globalised(rti_solver *s, int32_t cut) {
+    s->held = hold(s);
     while (s->damping <= MOST_DAMPING) {
-        rti_set_damping(s, &s->here, s->config->regularisation + s->damping);
+        set_damping(s);
         const int32_t result = rti_program(s, 0);
         if (result == QP_LATE) {
             return cut && s->damping == 0 ? rti_cut_short(s) : RTI_LATE;

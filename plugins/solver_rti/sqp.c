@@ -250,7 +250,7 @@ static int32_t iterate(rti_solver *s, const mhe_solve_control *control, int32_t 
     s->penalty = s->damping = 0;
     memset(s->weight, 0, sizeof(double) * size_x(&s->shape));
     s->least_excess = INFINITY;
-    s->last_is_known = s->missed_kinks = s->on_kink = s->stays = 0;
+    s->last_is_known = s->missed_kinks = s->on_kink = s->stays = s->on_level = 0;
     for (*iterations = 0;;) {
         rti_measure(s);
         const int32_t outcome = verdict(s, control, *iterations, limit);

@@ -7,6 +7,7 @@
 
 #define MOST_LOOSE 1e3
 #define UNSETTLED 1000 /* one of so many variables, far from the solution */
+#define FLAT 1e-5      /* proximal term of real-time iterations whose controls cost nothing */
 
 int32_t rti_is_spent(rti_solver *s) {
     const mhe_solve_control *control = s->control;
@@ -238,14 +239,29 @@ int32_t rti_cut_short(rti_solver *s) {
     return s->qp.iterations > 0 ? leap(s, QP_LATE) : RTI_LATE;
 }
 
+/* Where no control has a cost of its own, optima are many, and a program goes to any of them, far
+ * beyond what its linearisation is good for: nothing takes that back in the same window. A full
+ * step stays near its start then, as far as that costs next to nothing. */
+static void damp_full_step(rti_solver *s) {
+    const qp_shape *shape = &s->shape;
+    int32_t bent = 0;
+    for (int32_t k = 0; k < shape->N && !bent; k++) {
+        for (int32_t i = 0; i < shape->n_u && !bent; i++) {
+            bent = s->here.stages[k].H[i * (shape->ld_z + 1)] > s->here.damping;
+        }
+    }
+    const double given = s->config->regularisation;
+    rti_set_damping(s, &s->here, bent ? given : fmax(given, FLAT));
+}
+
 int32_t rti_leap_on(rti_solver *s) {
-    rti_set_damping(s, &s->here, s->config->regularisation);
+    damp_full_step(s);
     const int32_t result = rti_program(s, 0);
     return result == QP_FAILED ? RTI_STUCK : result == QP_LATE ? rti_cut_short(s) : leap(s, result);
 }
 
 int32_t rti_step_full(rti_solver *s) {
-    rti_set_damping(s, &s->here, s->config->regularisation);
+    damp_full_step(s);
     const int32_t result = rti_program(s, 0);
     if (result == QP_FAILED || result == QP_LATE) {
         return result == QP_FAILED ? RTI_STUCK : rti_cut_short(s);

@@ -5,6 +5,8 @@
 #include <errno.h>
 #include <math.h>
 #include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <stdlib.h>
 #include <string.h>
@@ -73,6 +75,18 @@ mhe_status qualisys_send(qualisys *s, const char *text, mhe_error *err) {
     return MHE_OK;
 }
 
+/* A sender may wait with a small packet until the one before is acknowledged (Nagle), and the
+ * system with that for 40 ms: frames would come in clumps. It is acknowledged at once; the system
+ * forgets that wish, so it is told each time. */
+static void acknowledge(int fd) {
+#ifdef TCP_QUICKACK
+    const int yes = 1;
+    (void)setsockopt(fd, IPPROTO_TCP, TCP_QUICKACK, &yes, sizeof yes);
+#else
+    (void)fd;
+#endif
+}
+
 mhe_status qualisys_receive(qualisys *s, double deadline, mhe_error *err) {
     if (s->n_bytes == s->room) {
         uint8_t *grown = s->room >= RT_LARGEST ? NULL : realloc(s->bytes, 2 * s->room);
@@ -91,6 +105,7 @@ mhe_status qualisys_receive(qualisys *s, double deadline, mhe_error *err) {
     }
     s->n_bytes += n > 0 ? (size_t)n : 0;
     s->received = qualisys_now();
+    acknowledge(s->socket);
     return MHE_OK;
 }
 

@@ -9,16 +9,15 @@
 
 #define ROOM (1u << 20)    /* bytes that are read at once, and grow to a whole packet */
 #define NUMBERS (1u << 18) /* of one component */
-#define AGAIN 0.5          /* s between two tries to connect anew */
+#define CONNECT 0.5        /* s that connecting anew may take */
 #define ANSWER 2.0         /* s that an answer may take */
-#define ASK_EVERY 1.0      /* s between two questions what data that differ are */
-#define SILENCE 2.0        /* s without 3D data, which are told */
 
 struct qualisys_config { /* filled by the core from the option table */
     const char *host;
     int32_t port;
     const char *device; /* analog device; "": the first */
     int32_t emg;
+    double silence, retry; /* s */
 };
 
 /* Stream 0: markers; stream 1: the analog device, where there is one. */

@@ -211,7 +211,8 @@ static mhe_status take_packet(qualisys *s, const rt_packet *packet, size_t used,
     if (type == RT_NO_MORE_DATA) {
         s->lost = 1;
         tell(s, MHE_SOURCE_LOST, -1, "QTM has no more data: the measurement has ended");
-    } else if (event == RT_EVENT_CHANGED || (s->differs && qualisys_now() - s->asked > ASK_EVERY)) {
+    } else if (event == RT_EVENT_CHANGED ||
+               (s->differs && qualisys_now() - s->asked > s->config.retry)) {
         const int by_data = event != RT_EVENT_CHANGED;
         s->asked = qualisys_now();
         s->differs = 0;
@@ -238,8 +239,8 @@ static mhe_status take_all(qualisys *s, mhe_error *err) {
 
 /* The connection is gone: told once, tried again now and then. */
 static void reconnect(qualisys *s, double deadline) {
-    if (qualisys_now() - s->tried < AGAIN) {
-        const double until = fmin(deadline, s->tried + AGAIN);
+    if (qualisys_now() - s->tried < s->config.retry) {
+        const double until = fmin(deadline, s->tried + s->config.retry);
         const double seconds = fmax(0, until - qualisys_now());
         const struct timespec pause = {(time_t)seconds, (long)(1e9 * fmod(seconds, 1))};
         (void)nanosleep(&pause, NULL);
@@ -247,7 +248,7 @@ static void reconnect(qualisys *s, double deadline) {
     }
     s->tried = qualisys_now();
     s->next_sample = 0;
-    if (begin(s, qualisys_now() + AGAIN, NULL) == MHE_OK) {
+    if (begin(s, qualisys_now() + CONNECT, NULL) == MHE_OK) {
         s->lost = 0;
         tell(s, MHE_SOURCE_CHANGED, -1, "QTM is back");
     }
@@ -266,11 +267,13 @@ static mhe_status qualisys_read(void *self, double deadline, const mhe_source_ta
     if (status == MHE_OK) {
         status = take_all(s, &why);
     }
-    if (status == MHE_OK && !s->lost && qualisys_now() - s->heard > SILENCE) {
+    if (status == MHE_OK && !s->lost && qualisys_now() - s->heard > s->config.silence) {
+        char text[80] = "QTM has stopped in the middle of a packet";
         s->lost = 1;
-        tell(s, MHE_SOURCE_LOST, -1,
-             s->n_bytes > 0 ? "QTM has stopped in the middle of a packet"
-                            : "QTM sends no 3D data for two seconds");
+        if (s->n_bytes == 0) {
+            (void)snprintf(text, sizeof text, "QTM sends no 3D data for %g s", s->config.silence);
+        }
+        tell(s, MHE_SOURCE_LOST, -1, text);
     }
     if (status == MHE_E_MEMORY) {
         return mhe_fail(err, status, "%s", why.text);
@@ -298,6 +301,11 @@ static const mhe_option qualisys_options[] = {
     MHE_OPT_BOOL(struct qualisys_config, emg, 1, "Take an analog device as EMG, too."),
     MHE_OPT_TEXT(struct qualisys_config, device, 0, "",
                  "Name of the analog device; empty: the first."),
+    MHE_OPT_REAL(struct qualisys_config, silence, 2.0, 0.01, 3600.0, "s",
+                 "Time without 3D data after which the stream counts as lost."),
+    MHE_OPT_REAL(struct qualisys_config, retry, 0.5, 0.01, 60.0, "s",
+                 "Time between two tries to connect anew, and between two questions what data are "
+                 "that differ from QTM's settings."),
 };
 
 static const mhe_plugin qualisys_plugin = {

@@ -49,6 +49,38 @@ for run in bench["runs"]: # the parts of a frame
     assert 0 < feedback["p50"] <= feedback["p99.9"] <= feedback["max"] < frame["max"]
     assert 0 < run["feedback_evaluation_ms"]["p50"] < feedback["p50"]
     assert 0 < run["feedback_rest_ms"]["p50"] < feedback["p50"]
+    # Of one run each frame is its own median.
+    assert {key: feedback[key] for key in feedback["by_frame"]} == feedback["by_frame"]
+END
+fi
+grep -q 'feedback by frame' table.txt && fail "one run has no medians of frames"
+[ ! -e result/frames.csv ] || fail "frames.csv was not asked for"
+
+# Each frame by its median over three runs: as what is written of every frame says.
+"$bench" "$demo" --quick --repeats 3 --no-layers --frames --vary horizon.window=2,3 --out frames > table.txt 2> err.txt || fail "--frames: $(cat err.txt)"
+has table.txt 'feedback by frame, ms' 'one run, x' 'p99.9, x'
+grep -q 'us a call' table.txt && fail "no layers were asked for"
+grep -q '"us"' frames/bench.json && fail "no layers were asked for"
+# A heading; of each variant three runs of 25 estimates but the first, which are numbered from 2.
+[ "$(wc -l < frames/frames.csv)" -eq 145 ] || fail "$(wc -l < frames/frames.csv) lines of frames"
+if command -v python3 > /dev/null; then
+    python3 - frames << 'END' || fail "frames.csv"
+import csv, json, math, statistics, sys
+bench = json.load(open(sys.argv[1] + "/bench.json"))
+rows = list(csv.DictReader(open(sys.argv[1] + "/frames.csv")))
+near = lambda a, b: math.isclose(a, b, abs_tol=2e-6)
+for i, run in enumerate(bench["runs"]):
+    of = [[row for row in rows if (row["variant"], row["run"]) == (str(i + 1), str(r))] for r in (1, 2, 3)]
+    assert all([int(row["estimate"]) for row in one] == list(range(2, 26)) for one in of)
+    for key in "prepare_ms", "feedback_ms", "feedback_evaluation_ms":
+        times = [[float(row[key]) for row in one] for one in of]
+        own = sorted(statistics.median(frame) for frame in zip(*times))
+        by_frame, every = run[key]["by_frame"], sorted(sum(times, []))
+        assert near(by_frame["p50"], own[11]) and near(by_frame["p99.9"], own[-1]) and near(by_frame["max"], own[-1])
+        assert near(run[key]["p50"], every[35]) and near(run[key]["max"], every[-1])
+        assert by_frame["max"] <= run[key]["max"] and every[0] <= own[0]
+        tails = [max(one) / sorted(one)[11] for one in times]
+        assert math.isclose(run[key]["p99.9_over_p50_of_a_run"], statistics.median(tails), rel_tol=1e-2)
 END
 fi
 [ -s result/rate.gp ] || fail "no rate.gp"
@@ -95,6 +127,8 @@ refused 'a value is empty' "$demo" --vary horizon.window=3,,4
 refused 'more than 64' "$demo" --vary horizon.window=1,2,3,4,5,6,7,8,9 --vary horizon.ratio=1,2,3,4,5,6,7,8,9
 refused "did you mean 'window'" "$demo" --vary horizon.windw=1,2
 refused "'window' must lie" "$demo" --vary horizon.window=3,0
+refused 'with a config file' --scale --frames
+refused 'with a config file' --scale --vary horizon.window=3,7
 refused 'too few' "$demo" --quick --vary horizon.window=3,900
 "$bench" --help | grep -q -- '--vary' || fail "--help"
 "$bench" --version | grep -q '^mhe-bench [0-9]' || fail "--version"

@@ -105,6 +105,23 @@ def test_where_and_when():
     assert any(abs(delay - early) < 0.004 for delay in delays), delays
 
 
+def test_forces_as_cost():
+    """Little forces are asked for beside: strengths are found as without, and the forces are a little less."""
+    least = CONFIG.replace("residual_torque: 0.1}]", "residual_torque: 0.1}, {plugin: mhe.cost.track, signal: muscle_force, value: [0], "
+                           "sigma: 500}, {plugin: mhe.cost.track, signal: joint_moment, value: [0], sigma: 1000}]")
+    write("least.yaml", least)
+    done = run(CALIBRATE, "least.yaml", "--out", "least", "--quiet")
+    assert done.returncode == 0, done.stderr
+    told = []
+    for out in ("out", "least"):
+        with open(out + "/calibration.json") as file:
+            told.append(json.load(file))
+    assert told[1]["outcome"] == "converged", told[1]["outcome"]
+    values = [[p["after"] for p in t["parameters"]] for t in told]
+    off = [abs(a - b) for a, b in zip(*values)]
+    assert 1e-4 < max(off) < 0.05, off
+
+
 def test_delay():
     """Motions of 2 s without noise: a delay is off by less than half its standard deviation, whatever it is."""
     config = re.sub("([ABC])_emg", r"\1_late", CONFIG).replace("model.osim", ARM)
@@ -180,4 +197,4 @@ def test_solvers_agree():
     assert max(moved) > 0.1 and off < 1e-8, (moved, off)
 
 
-all_of([test_finds, test_where_and_when, test_delay, test_scales_first, test_solvers_agree])
+all_of([test_finds, test_forces_as_cost, test_where_and_when, test_delay, test_scales_first, test_solvers_agree])

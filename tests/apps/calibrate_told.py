@@ -72,6 +72,37 @@ def test_channels():
     assert re.search(r"EMG of BRD reaches 1.20 times its MVC.*its emg_gain became", done.stderr), done.stderr
 
 
+def test_doubts():
+    """What is never there, hardly there, or wider than it may be, is told before anything is learned."""
+    with open("B_emg.sto") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+    labels = [re.sub("^e_", "", label) for label in lines[head].split("\t")]
+    for i in range(head + 1, len(lines)):
+        cells = lines[i].split("\t")
+        if len(cells) == len(labels):
+            cells[labels.index("SubScap")] = "nan"
+            cells[labels.index("BRD")] = "%.6g" % (1e-3 * float(cells[labels.index("BRD")]))
+            lines[i] = "\t".join(cells)
+    write("B_faint.sto", "\n".join(lines))
+    with open("B/markers.trc") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
+    second = [label for label in lines[3].split("\t")[2:] if label][1]
+    for i in range(head, len(lines)):
+        cells = lines[i].split("\t")
+        lines[i] = "\t".join(cells[:5] + [""] * 3 + cells[8:]) if len(cells) > 8 else lines[i]
+    write("B_less.trc", "\n".join(lines))
+    config = CONFIG.replace("B_emg", "B_faint").replace("B/markers.trc", "B_less.trc").replace("sd: 0.2", "sd: 5")
+    write("doubts.yaml", config.replace("calibrate:", "calibrate:\n  noise_time: 10"))
+    done = run(CALIBRATE, "doubts.yaml", "--out", "doubts", "--quiet", "--set", "calibrate.max_iterations=1")
+    assert done.returncode == 0, done.stderr
+    for said in ("B_faint.sto: muscles without EMG in any frame: SubScap;", "B_faint.sto: EMG of a two-hundredth of what another "
+                 "recording has: BRD;", "B_less.trc: markers that are missing in every frame: %s;" % second,
+                 "max_isometric_force: 'sd' is 5, wider than its bounds, 0.2 .. 3", "noise_time: 10 s is longer than each recording (2 s"):
+        assert said in done.stderr, (said, done.stderr)
+
+
 def test_copies():
     """A recording that is there twice counts twice, and one that is held out should not have been learned from."""
     write("copy.trc", open("B/markers.trc").read())
@@ -105,6 +136,12 @@ def test_wrong_input():
     expect("unknown parameter", CONFIG.replace("emg_gain", "emg_gian"), "bad.yaml:14", "emg_gain")
     expect("unknown muscle", CONFIG.replace("[BRA, Deltoid2]", "[BRA, Deltoid8]"), "bad.yaml:14", "Deltoid8", "Deltoid")
     expect("bounds cross", CONFIG.replace("sd: 0.2,", "sd: 0.2, lower: 2, upper: 1,"), "bad.yaml:13", "lower", "2", "1")
+    expect("percent", CONFIG.replace("sd: 0.2,", "sd: 0.2, lower: 80, upper: 120,"), "bad.yaml:13", "'lower' is 80", "factor")
+    expect("newtons", CONFIG.replace("sd: 0.2,", "sd: 0.2, mean: 900,"), "bad.yaml:13", "'mean' is 900", "factor")
+    expect("millimetres", CONFIG.replace("{name: emg_gain, muscles: [BRA, Deltoid2]}", "{name: marker_offset, lower: -20, upper: 20}"),
+           "bad.yaml:14", "'lower' is -20", "in m: 10 mm are 0.01")
+    expect("milliseconds", CONFIG.replace("{name: emg_gain, muscles: [BRA, Deltoid2]}", "{name: emg_delay, upper: 50}"), "bad.yaml:14",
+           "'upper' is 50", "in s: 50 ms are 0.05")
     expect("mean outside", CONFIG.replace("sd: 0.2,", "sd: 0.2, mean: 9,"), "bad.yaml:13", "mean", "9")
     expect("a muscle's bodies", CONFIG.replace("emg_gain", "insertion, bodies: [hand]"), "bad.yaml:14", "insertion", "bodies")
     expect("unknown body", CONFIG.replace("{name: emg_gain, muscles: [BRA, Deltoid2]}", "{name: segment_mass, bodies: [hnad]}"),
@@ -117,7 +154,7 @@ def test_wrong_input():
     expect("a marker's muscles", CONFIG.replace("emg_gain", "marker_offset"), "bad.yaml:14", "muscles")
     costs = "costs: [{plugin: mhe.cost.emg-markers}, %s]"
     for cost, why in (("{plugin: mhe.cost.rate, signal: excitation}", "the node before"),
-                      ("{plugin: mhe.cost.track, signal: muscle_force, value: [0]}", "muscle forces")):
+                      ("{plugin: mhe.cost.joint-stability, joint: elbow, axis: [1, 0, 0]}", "joint reactions")):
         expect(cost, re.sub("costs: .*", costs % cost, CONFIG), "bad.yaml:5", "costs.1", why, "Leave it out")
     expect("no motion", CONFIG.replace("markers: B/markers.trc, ", ""), "bad.yaml:10", "markers", "angles")
     expect("no EMG", re.sub(", emg: ._emg.sto", "", CONFIG), "bad.yaml:14", "emg_gain", "no recording")
@@ -133,7 +170,19 @@ def test_wrong_input():
         lines[i] = "\t".join(cells)
     write("other.trc", "\n".join(lines))
     expect("two persons", CONFIG.replace("B/markers.trc", "other.trc"), "other.trc", "apart", "one person")
+    for name, source, factor, first in (("inches", "B/markers.trc", 39.37, 2), ("faint", "B_emg.sto", 1e-3, 1)):
+        with open(source) as file:
+            lines = file.read().split("\n")
+        head = next(i for i, line in enumerate(lines) if line.startswith("1\t" if first == 2 else "time"))
+        for i in range(head + (first == 1), len(lines)):
+            cells = lines[i].split("\t")
+            lines[i] = "\t".join(cells[:first] + ["%.6g" % (factor * float(cell)) if cell else "" for cell in cells[first:]])
+        write(name, "\n".join(lines))
+    os.rename("inches", "inches.trc")
+    os.rename("faint", "faint.sto")
+    expect("inches", CONFIG.replace("B/markers.trc", "inches.trc"), "inches.trc", "39.37 times as far apart", "another unit")
+    expect("volts", CONFIG.replace("B_emg.sto", "faint.sto"), "faint.sto", "no muscle reaches 1 % of its MVC", "unit")
     expect("absent", CONFIG.replace("A_emg.sto", "A_gme.sto"), "A_gme.sto")
 
 
-all_of([test_told, test_channels, test_copies, test_another_person, test_wrong_input])
+all_of([test_told, test_channels, test_doubts, test_copies, test_another_person, test_wrong_input])

@@ -119,13 +119,18 @@ same() {
         "$2/$1-robust/estimates.sto" "$2/$1-ipopt/estimates.sto" || fail "$1: robust and ipopt differ"
 }
 
-# answered NAME FOLDER: no optimum is the only one: all windows converge by default settings
+# answered NAME FOLDER: no optimum is the only one: all windows converge by default settings, to the same angles
 answered() {
     count=$((count + 1))
     for solver in 'robust rti, preset: robust' 'speed rti' 'ipopt ipopt'; do
         by "$1" "$2" "${solver%% *}" "${solver#* }"
         settled "$1" "$2" "${solver%% *}"
     done
+    paste "$2/$1-robust/estimates.sto" "$2/$1-ipopt/estimates.sto" | awk -v name="$1" '
+        /^time/ {n = NF / 2; for (i = 2; i <= n; i++) angle[i] = $i ~ /^q_/; next}
+        n {rows++; for (i = 2; i <= n; i++) if (angle[i]) {seen++; d = $i - $(i + n); d = d < 0 ? -d : d; if (!(d <= most)) most = d}}
+        END {printf "%-14s %4d estimates, %.1e rad apart at most\n", name, rows, most; exit !(rows > 0 && seen == 2 * rows && most <= 1e-3)}' ||
+        fail "$1: robust and ipopt differ in what markers say"
 }
 
 # told NAME FOLDER STATUS 'TEXT': all three end so, with this said
@@ -144,6 +149,7 @@ else
     seconds=0.4 muscles=40 window=60
 fi
 motion usual 2 6 $seconds 0.15 0.1
+motion loose 2 6 2 0.15 0.1
 motion long 2 6 "$(awk -v n=$window 'BEGIN {print (n + 5) / 100}')" 0.15 0.1
 motion still 2 6 $seconds 0.05 0
 motion one 1 1 $seconds 0.15 0.1
@@ -173,14 +179,17 @@ same none none 1e-9
 config singular usual 7 3 'costs: [{plugin: mhe.cost.track, signal: markers, sigma: 0.002},
     {plugin: mhe.cost.track, signal: activation, value: [0.1], sigma: 0.1}]'
 same singular usual
-config flat usual 7 3 'costs: [{plugin: mhe.cost.track, signal: markers, sigma: 0.002}]'
-answered flat usual
+config flat loose 7 3 'costs: [{plugin: mhe.cost.track, signal: markers, sigma: 0.002}]'
+answered flat loose
 config upside-down usual 7 3 'bounds: {excitation_min: 0.6, excitation_max: 0.1}'
 told upside-down usual 2 "bounds: 'excitation_min' is above 'excitation_max'"
 config unreachable usual 7 3 'bounds: {excitation_max: 0.01, activation_min: 0.3}'
 told unreachable usual 1 'every solve failed'
+told unreachable usual 1 'within its bounds; activation of'
 config apart usual 7 3 'bounds: {excitation_min: 0.05, excitation_max: 0.05, activation_min: 0.3, activation_max: 0.3}'
 told apart usual 1 'every solve failed'
+told apart usual 1 'at their bounds: activation (all of one value), excitation (all of one value)'
+told apart usual 1 'bounds: excitation_min and excitation_max are both 0.05: the controls are fixed'
 
 echo "$count configs"
 [ -n "${KEEP:-}" ] && cp -r . "$KEEP"

@@ -3,7 +3,8 @@
  *
  *   test_estimator_coverage                  a slice, as a test
  *   test_estimator_coverage DRAWS REFERENCE.sto...   the table of docs/uncertainty.md
- *   test_estimator_coverage NUMBER:DRAWS REFERENCE.sto...   one of its conditions, 0 the first */
+ *   test_estimator_coverage NUMBER:DRAWS REFERENCE.sto...   one of its conditions, 0 the first
+ * DRAWS is the last, or FIRST-LAST. */
 #include "estimator/recording.h"
 #include "fixture.h"
 #include "noise/noise.h"
@@ -25,12 +26,14 @@
 typedef struct condition {
     const char *name;
     double emg, gain, strength, fiber, tendon, offset;
+    int32_t learnt; /* offsets are, as the recording runs */
 } condition;
 
 static const condition conditions[] = {
-    {"EMG noise 1", 1, 0, 0, 0, 0, 0},        {"EMG noise 1.5", 1.5, 0, 0, 0, 0, 0},
-    {"EMG noise 2", 2, 0, 0, 0, 0, 0},        {"gain 30 %", 0, 0.3, 0, 0, 0, 0},
-    {"parameters", 0, 0, 0.3, 0.05, 0.03, 0}, {"all", 1, 0.2, 0.3, 0.05, 0.03, 0.005},
+    {"EMG noise 1", 1, 0, 0, 0, 0, 0, 0},        {"EMG noise 1.5", 1.5, 0, 0, 0, 0, 0, 0},
+    {"EMG noise 2", 2, 0, 0, 0, 0, 0, 0},        {"gain 30 %", 0, 0.3, 0, 0, 0, 0, 0},
+    {"parameters", 0, 0, 0.3, 0.05, 0.03, 0, 0}, {"all", 1, 0.2, 0.3, 0.05, 0.03, 0.005, 0},
+    {"offsets", 1, 0, 0, 0, 0, 0.01, 0},         {"offsets learnt", 1, 0, 0, 0, 0, 0.01, 1},
 };
 #define N_CONDITIONS ((int32_t)(sizeof conditions / sizeof conditions[0]))
 
@@ -39,7 +42,9 @@ typedef struct count {
     double by_muscle[N_M], each; /* of each muscle, and squares of ... */
     double below[N_M];           /* bands that lie below the truth, of each muscle */
     double force[N_M], error[N_M], band[N_M];
-    double angles, of_angles, angle_squares;
+    double angles, of_angles, angle_squares, angle_bands;
+    double first_band,
+        last_band;            /* RMS of the angles' bands in a trial's first and last estimate */
     double squares, variance; /* of errors, of bands */
     /* Of each muscle over the trials: sum and squares of the share held in one. What is wrong is
      * the same all through a trial, so that trials are what counts as independent. */
@@ -53,8 +58,9 @@ static void write_config(const condition *c, char *yaml, size_t size) {
                    "output: {uncertainty: true}\n"
                    "uncertainty: {emg_noise: %g, emg_gain: %g, max_isometric_force: %g, "
                    "optimal_fiber_length: %g, tendon_slack_length: %g, path_length: 0, "
-                   "marker_noise: 1e-5, marker_offset: %g, emg_floor: 0}\n",
-                   c->emg > 0 ? 0.5 : 0, c->gain, c->strength, c->fiber, c->tendon, c->offset);
+                   "marker_noise: 1e-5, marker_offset: %g, emg_floor: 0}\n%s",
+                   c->emg > 0 ? 0.5 : 0, c->gain, c->strength, c->fiber, c->tendon, c->offset,
+                   c->learnt ? "data: {rates: true, marker_offset: 0.01}\n" : "");
 }
 
 /* A model whose muscles are wrong. */
@@ -92,12 +98,17 @@ static void compare(const mhe_estimate *e, const mhi_recording *r, const double 
     }
     to->of += N_M;
     to->each += 1;
+    double band = 0;
     for (int32_t j = 0; j < N_Q; j++) {
         const double error = e->q[j] - r->reference.q[frame * N_Q + j];
         to->angles += fabs(error) <= 1.96 * e->q_sd[j];
         to->angle_squares += error * error;
+        band += e->q_sd[j] * e->q_sd[j];
     }
+    to->angle_bands += band;
     to->of_angles += N_Q;
+    to->last_band = sqrt(band / N_Q);
+    to->first_band = to->of_angles == N_Q ? to->last_band : to->first_band;
 }
 
 /* Ends a trial, of which `before` is what was counted before it. */
@@ -177,10 +188,11 @@ static void print_row(const condition *of, const count *c) {
         least = fmin(least, c->by_muscle[m] / c->each);
         most = fmax(most, c->by_muscle[m] / c->each);
     }
-    (void)printf("%-14s %8.1f %8.1f %8.1f %8.1f %8.3f %10.2f %10.2f %7.0f\n", of->name,
+    (void)printf("%-14s %8.1f %8.1f %8.1f %8.1f %8.3f %10.2f %10.2f %7.0f %8.3f\n", of->name,
                  100 * c->held / c->of, 100 * least, 100 * most, 100 * c->angles / c->of_angles,
                  57.29578 * sqrt(c->angle_squares / c->of_angles), sqrt(c->squares / c->of),
-                 sqrt(c->variance / c->of), c->trials);
+                 sqrt(c->variance / c->of), c->trials,
+                 57.29578 * sqrt(c->angle_bands / c->of_angles));
     for (int32_t m = 0; m < N_M; m++) {
         (void)printf("    %2d %6.1f +- %4.1f %6.1f %8.1f %8.2f %8.2f\n", m,
                      100 * c->by_muscle[m] / c->each, 100 * standard_error(c, m),
@@ -190,15 +202,17 @@ static void print_row(const condition *of, const count *c) {
     (void)fflush(stdout);
 }
 
-static void table(int32_t only, int32_t draws, char **references, int32_t n) {
-    (void)printf("%-14s %8s %8s %8s %8s %8s %10s %10s %7s\n", "", "forces", "least", "most",
-                 "angles", "deg", "error (N)", "band (N)", "trials");
+static void table(int32_t only, const char *draws, char **references, int32_t n) {
+    const char *last = strchr(draws, '-');
+    const int32_t from = last == NULL ? 1 : atoi(draws), to = atoi(last == NULL ? draws : last + 1);
+    (void)printf("%-14s %8s %8s %8s %8s %8s %10s %10s %7s %8s\n", "", "forces", "least", "most",
+                 "angles", "deg", "error (N)", "band (N)", "trials", "sd, deg");
     const int32_t first = only < 0 ? 0 : only, end = only < 0 ? N_CONDITIONS : only + 1;
     for (int32_t i = first; i < end; i++) {
         count c = {0};
-        for (int32_t draw = 0; draw < draws; draw++) {
+        for (int32_t draw = from; draw <= to; draw++) {
             for (int32_t r = 0; r < n; r++) {
-                run(&conditions[i], references[r], 1000 * r + draw + 1, &c);
+                run(&conditions[i], references[r], 1000 * r + draw, &c);
             }
         }
         print_row(&conditions[i], &c);
@@ -219,6 +233,17 @@ static void a_slice_of_the_table_holds(void **state) {
                       100 * c.held / c.of, error, band);
         assert_true(c.held > 0.85 * c.of);
         assert_true(band < 5 * error); /* wide bands hold anything */
+        if (conditions[i]
+                .learnt) { /* bands narrow as the arm moves, and are still those of the errors */
+            print_message(
+                "    angles %.1f %%, errors %.2f deg, bands %.2f, from %.2f to %.2f deg\n",
+                100 * c.angles / c.of_angles, 57.29578 * sqrt(c.angle_squares / c.of_angles),
+                57.29578 * sqrt(c.angle_bands / c.of_angles), 57.29578 * c.first_band,
+                57.29578 * c.last_band);
+            assert_true(c.angles > 0.85 * c.of_angles);
+            assert_true(c.angle_bands < 9 * c.angle_squares);
+            assert_true(c.last_band < 0.8 * c.first_band);
+        }
     }
 }
 
@@ -227,7 +252,7 @@ int main(int argc, char **argv) {
     if (argc > 2) {
         const char *draws = strchr(argv[1], ':');
         const int32_t only = draws == NULL ? -1 : atoi(argv[1]) % N_CONDITIONS;
-        table(only, atoi(draws == NULL ? argv[1] : draws + 1), argv + 2, argc - 2);
+        table(only, draws == NULL ? argv[1] : draws + 1, argv + 2, argc - 2);
         return 0;
     }
     return cmocka_run_group_tests(tests, NULL, NULL);

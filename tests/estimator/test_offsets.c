@@ -92,6 +92,11 @@ static outcome run(const char *cost, const char *data, double off, int32_t missi
         out.place += pow(found[i] - offset[i], 2) / N;
         assert_true(i / 3 != missing || found[i] == 0); /* nothing is known of it */
     }
+    double told[N] = {0};
+    assert_int_equal(mhe_estimator_marker_offsets(f.estimator, told), found != NULL);
+    for (int32_t i = 0; i < N; i++) {
+        assert_true(told[i] == (found == NULL ? 0 : found[i]));
+    }
     out.place = sqrt(out.place);
     out.angle = sqrt(out.angle / n);
     out.late = sqrt(out.late / n_late);
@@ -148,7 +153,7 @@ static void postures_go_with_offsets(void **state) {
     test_fixture f;
     mhi_start *start = NULL;
     const double q[N_Q] = {-0.2, -1, -0.4, 0.4}, step = 1e-4;
-    double markers[N], moved[N], offset[N] = {0}, window[N_Q], rms;
+    double markers[N], moved[N], offset[N] = {0}, window[N_Q], move[N_Q], rms;
     (void)state;
     open_config(&f, "mhe.cost.emg-markers", ", marker_offset: 0.01");
     mhi_offsets *o = &f.estimator->rates.offsets;
@@ -169,10 +174,12 @@ static void postures_go_with_offsets(void **state) {
             memcpy(found[side], q, sizeof q);
             assert_int_equal(mhi_start_posture(start, moved, found[side], &rms, &f.err), MHE_OK);
         }
+        offset[i] = 1;
+        mhi_offset_follow_move(&o->node[0].follow, offset, N, N_Q, move);
         offset[i] = 0;
         for (int32_t j = 0; j < N_Q; j++) {
             const double slope = (found[1][j] - found[0][j]) / (2 * step);
-            assert_true(fabs(o->follow[j * N + i] - slope) < 1e-4 * (1 + fabs(slope)));
+            assert_true(fabs(move[j] - slope) < 1e-4 * (1 + fabs(slope)));
         }
     }
     mhi_start_free(start);

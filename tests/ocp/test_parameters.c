@@ -27,7 +27,71 @@ static const char *const configs[] = {
     "  {plugin: mhe.cost.track, signal: markers, sigma: 0.1, huber: 1}]\n",
     "model: {file: $ARM19}\nmuscle: {curves: paper2021, passive_ramp: 0.3}\n"
     "costs: [{plugin: mhe.cost.emg-markers, markers: 0.1, emg_spread: 0.5}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: degroote2016}\n"
+    "costs: [{plugin: mhe.cost.track, signal: muscle_force, sigma: 100},\n"
+    "  {plugin: mhe.cost.track, signal: joint_moment, sigma: 5, huber: 1},\n"
+    "  {plugin: mhe.cost.emg-markers, markers: 0.1}]\n",
+    "model: {file: $ARM19}\nmuscle: {curves: degroote2016, tendon: elastic}\nformulation: "
+    "activation\n"
+    "costs: [{plugin: mhe.cost.track, signal: muscle_force, sigma: 100},\n"
+    "  {plugin: mhe.cost.track, signal: joint_moment, sigma: 5}]\n",
 };
+
+/* A cost whose residuals are of several signals each: products of neighbours in y. */
+static mhe_status products_layout(const void *self, const mhe_problem *problem,
+                                  mhe_cost_layout *out, mhe_error *err) {
+    static const char *const names[] = {"excitation", "muscle_force", "joint_moment", "markers"};
+    int32_t ny = 0;
+    const char *unit;
+    (void)self, (void)err;
+    out->n_signals = 4;
+    for (int32_t i = 0; i < 4; i++) {
+        int32_t n = 0;
+        out->signals[i] = problem->find_signal(problem, names[i], &n, &unit);
+        assert_true(out->signals[i] >= 0);
+        ny += n;
+    }
+    out->n_res = ny - 1;
+    return MHE_OK;
+}
+
+/* Each signal in units of its size. */
+static double size_of(int32_t i) {
+    return i < N_M ? 1 : i < 2 * N_M ? 100 : i < 2 * N_M + 4 ? 5 : 0.1;
+}
+
+static mhe_status products_residual(const void *self, const mhe_stage *s, double *r,
+                                    mhe_error *err) {
+    (void)self, (void)err;
+    for (int32_t i = 0; i + 1 < s->ny; i++) {
+        const int32_t with = (i + 7) % s->ny;
+        r[i] = s->y[i] / size_of(i) * s->y[with] / size_of(with);
+    }
+    return MHE_OK;
+}
+
+static mhe_status products_jacobian(const void *self, const mhe_stage *s, double *J,
+                                    mhe_error *err) {
+    (void)self, (void)err;
+    for (int32_t i = 0; i + 1 < s->ny; i++) {
+        const int32_t with = (i + 7) % s->ny;
+        J[i * s->ny + i] += s->y[with] / size_of(with) / size_of(i);
+        J[i * s->ny + with] += s->y[i] / size_of(i) / size_of(with);
+    }
+    return MHE_OK;
+}
+
+static const mhe_cost_ops products_ops = {.size = sizeof products_ops,
+                                          .layout = products_layout,
+                                          .residual = products_residual,
+                                          .jacobian = products_jacobian};
+static const mhe_plugin products = {.size = sizeof products,
+                                    .id = "test.cost.products",
+                                    .version = "1",
+                                    .summary = "Products.",
+                                    .reference = "",
+                                    .iface = MHE_COST_IFACE,
+                                    .ops = &products_ops};
 
 typedef struct rig {
     test_fixture f;
@@ -83,7 +147,7 @@ static void choose(rig *r) {
     assert_true(r->n_p <= MOST_P);
 }
 
-static void rig_open(rig *r, const char *config) {
+static void rig_open_with(rig *r, const char *config, const mhe_plugin *instead) {
     static const char *const names[] = {"max_isometric_force", "optimal_fiber_length",
                                         "tendon_slack_length", "insertion", "segment_mass"};
     memset(r, 0, sizeof *r);
@@ -115,6 +179,9 @@ static void rig_open(rig *r, const char *config) {
     for (int32_t i = 0; i < run->n_costs; i++) {
         const mhi_use *c = &run->costs[i];
         terms[i] = (mhi_term_setup){c->plugin, c->config, c->weight, c->sigma, c->huber};
+        if (instead != NULL) {
+            terms[i] = (mhi_term_setup){instead, NULL, 1, 1, 0};
+        }
     }
     const mhi_parameters_setup parameters = {.n = r->n_p,
                                              .list = r->list,
@@ -142,6 +209,10 @@ static void rig_open(rig *r, const char *config) {
     }
     r->problem = mhi_ocp_face(r->ocp);
     assert_int_equal(r->problem->n_p, r->n_p);
+}
+
+static void rig_open(rig *r, const char *config) {
+    rig_open_with(r, config, NULL);
 }
 
 static void rig_close(rig *r) {
@@ -276,29 +347,43 @@ static void derivatives_by_parameters(void **state) {
     }
 }
 
-/* Where residuals vanish the Gauss-Newton blocks are the true derivatives of the gradient. */
-static void mixed_derivatives(void **state) {
+/* Costs that read several signals in one residual. */
+static void several_signals_at_once(void **state) {
+    uint64_t seed = 9;
+    rig r;
+    double x[128], u[64];
     (void)state;
+    rig_open_with(&r, configs[3], &products);
+    set_targets(&r, &seed);
+    random_point(&r, &seed, x, u);
+    check(&r, 0, x, u);
+    check(&r, N - 1, x, u);
+    rig_close(&r);
+}
+
+/* Where residuals vanish the Gauss-Newton blocks are the true derivatives of the gradient. */
+static void check_mixed(const char *config) {
     uint64_t seed = 3;
     rig r;
     double z[160];
-    rig_open(&r, configs[0]);
+    rig_open(&r, config);
     const int32_t n_x = r.problem->n_x, n_u = r.problem->n_u, k = 1, n_p = r.n_p;
     random_point(&r, &seed, z, z + n_x);
     assert_int_equal(r.problem->set_parameters(r.problem, r.p, &r.f.err), MHE_OK);
     /* the targets are what the model says there */
     const mhi_signals *signals = mhi_ocp_signals(r.ocp);
     double *y = calloc((size_t)signals->n_y, sizeof *y), *room = calloc(4096, sizeof *room);
-    const uint32_t wanted = 1u << MHI_SIGNAL_MARKERS | 1u << MHI_SIGNAL_EXCITATION;
+    const uint32_t wanted = 1u << MHI_SIGNAL_MARKERS | 1u << MHI_SIGNAL_EXCITATION |
+                            1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT;
     assert_int_equal(mhi_signals_evaluate(signals, r.system, mhi_ocp_context(r.ocp), wanted, z,
                                           z + n_x, y, NULL, &r.f.err),
                      MHE_OK);
-    assert_true(mhi_parameters_room(r.system) <= 4096);
+    assert_true(mhi_parameters_room(r.system, n_p) <= 4096);
     assert_int_equal(mhi_parameters_measure(mhi_ocp_parameters(r.ocp), signals, r.system,
-                                            mhi_ocp_context(r.ocp), wanted, k, z, NULL, room, y,
-                                            NULL, NULL, &r.f.err),
+                                            mhi_ocp_context(r.ocp), wanted, k, z, z + n_x, NULL,
+                                            room, y, NULL, NULL, &r.f.err),
                      MHE_OK);
-    for (int32_t s = 0; s <= MHI_SIGNAL_EXCITATION; s++) {
+    for (int32_t s = 0; s <= MHI_SIGNAL_JOINT_MOMENT; s++) {
         double *target = mhi_ocp_target(r.ocp, s, k);
         for (int32_t i = 0; i < signals->signal[s].n_y && (wanted >> s & 1); i++) {
             target[i] = y[signals->signal[s].offset + i];
@@ -322,6 +407,12 @@ static void mixed_derivatives(void **state) {
     assert_true(test_jacobian_error(grad_p_at, &at, z, n_x + n_u, n_p, pz) < TOLERANCE);
     free(y), free(room), free(px), free(pu), free(pz);
     rig_close(&r);
+}
+
+static void mixed_derivatives(void **state) {
+    (void)state;
+    check_mixed(configs[0]);
+    check_mixed(configs[4]);
 }
 
 /* What leads from one motion to the next: its first state is whatever the controls say, and of what
@@ -365,8 +456,8 @@ static void a_junction_forgets(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(derivatives_by_parameters),
-                                       cmocka_unit_test(mixed_derivatives),
-                                       cmocka_unit_test(a_junction_forgets)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(derivatives_by_parameters), cmocka_unit_test(mixed_derivatives),
+        cmocka_unit_test(several_signals_at_once), cmocka_unit_test(a_junction_forgets)};
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

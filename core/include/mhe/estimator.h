@@ -277,6 +277,10 @@ MHE_API mhe_status mhe_estimator_describe(const mhe_estimator *estimator, mhe_es
  * not, "file:line: what". [cold] */
 MHE_API mhe_status mhe_estimator_covers(const mhe_estimator *estimator, double first, double last,
                                         int32_t measured, mhe_error *err);
+/* How far each marker is from its place in its segment as far as it is learnt by now
+ * (data.marker_offset): offsets [n_markers x 3] in the axes of the marker's body, m. Returns 1; 0
+ * where none are learnt, and offsets stay as they are. [cold] */
+MHE_API int32_t mhe_estimator_marker_offsets(const mhe_estimator *estimator, double *offsets);
 /* Row of the table with this name; -1: there is none. [any] */
 MHE_API int32_t mhe_estimator_find_channel(const mhe_estimator *estimator, const char *name);
 /* Fills `counts` of a channel up to its size. [cold] */

@@ -8,7 +8,58 @@
 /* Four doubles, wherever they lie. */
 typedef double lanes __attribute__((vector_size(32), aligned(8), may_alias));
 
+/* Sum of what rows[k] row[k] are over the first n, for each of four rows, off sum. */
+__attribute__((always_inline)) static inline void
+less_products(const double *rows, int32_t ld, const double *row, int32_t n, double *sum) {
+    lanes products[4] = {{0}};
+    int32_t k = 0;
+    for (; k + 4 <= n; k += 4) {
+        const lanes with = *(const lanes *)(row + k);
+        for (int32_t r = 0; r < 4; r++) {
+            products[r] += *(const lanes *)(rows + r * ld + k) * with;
+        }
+    }
+    for (int32_t r = 0; r < 4; r++) {
+        sum[r] -= (products[r][0] + products[r][1]) + (products[r][2] + products[r][3]);
+        for (int32_t i = k; i < n; i++) {
+            sum[r] -= rows[r * ld + i] * row[i];
+        }
+    }
+}
+
+#define WIDE 64 /* rows from which on vectors are worth what their sums cost at the end */
+
+CLONES static int factor_wide(double *A, int32_t n) {
+    for (int32_t j = 0; j < n; j++) {
+        double *row_j = A + j * n;
+        double pivot[4] = {row_j[j]};
+        int32_t i = j + 1;
+        less_products(row_j, 0, row_j, j, pivot);
+        if (!(pivot[0] > 0)) {
+            return -1;
+        }
+        row_j[j] = 1 / sqrt(pivot[0]);
+        for (; i + 4 <= n; i += 4) {
+            double *rows = A + i * n,
+                   sum[4] = {rows[j], rows[n + j], rows[2 * n + j], rows[3 * n + j]};
+            less_products(rows, n, row_j, j, sum);
+            for (int32_t r = 0; r < 4; r++) {
+                rows[r * n + j] = sum[r] * row_j[j];
+            }
+        }
+        for (; i < n; i++) {
+            double sum[4] = {A[i * n + j]};
+            less_products(A + i * n, 0, row_j, j, sum);
+            A[i * n + j] = sum[0] * row_j[j];
+        }
+    }
+    return 0;
+}
+
 int mhi_cholesky_factor(double *A, int32_t n) {
+    if (n > WIDE) {
+        return factor_wide(A, n);
+    }
     for (int32_t j = 0; j < n; j++) {
         double *row_j = A + j * n;
         double pivot = row_j[j];

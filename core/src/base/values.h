@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Ascending; none of them is NaN. [cold] */
+/* Ascending; none of them is NaN. [cold]; up to 100 [hot]: nothing is allocated for these. */
 void mhi_sort(double *values, ptrdiff_t n);
 
 /* 1 where none of values [n] is NaN or infinite. [hot] */

@@ -145,6 +145,22 @@ static void check_masses(const mhe_description *d, mhi_findings *findings) {
     }
 }
 
+/* Bounds that leave the controls nothing to choose: the motion follows from its first state. */
+static void check_bounds(const mhi_run *run, mhi_findings *findings) {
+    const mhi_bounds_section *b = &run->bounds;
+    const int32_t by_activation = run->formulation == MHE_FORMULATION_ACTIVATION;
+    const double least = by_activation ? b->activation_min : b->excitation_min;
+    const double most = by_activation ? b->activation_max : b->excitation_max;
+    const char *name = by_activation ? "activation" : "excitation";
+    if (least == most && !b->residual_torques && !b->actuators) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "give them a range, or let bounds.residual_torques follow the motion",
+                         "bounds: %s_min and %s_max are both %g: the controls are fixed, and no "
+                         "motion but one can be followed",
+                         name, name, least);
+    }
+}
+
 /* Fibre lengths at the postures [n x n_q], by a tendon that does not give. */
 static mhe_status check_fibres(const mhi_system *system, const double *q, int32_t n,
                                mhi_findings *findings, mhe_error *err) {
@@ -195,7 +211,7 @@ mhe_status mhi_believe_model(const mhi_run *run, const mhi_system *system, const
                              mhi_findings *findings, mhe_error *err) {
     const mhe_description *d = mhi_system_description(system);
     mhi_pose_search *s = NULL;
-    (void)run;
+    check_bounds(run, findings);
     check_muscles(d, findings);
     check_masses(d, findings);
     mhe_status status = mhi_pose_open(system, r, &s, err);

@@ -158,12 +158,14 @@ void mhi_diagnosis_add(mhi_diagnosis *d, const mhe_estimate *e) {
     add_markers(d, measured(f, e, "markers"), e->markers);
     add_stretch(d, e->time);
     const double *control = e->excitation != NULL ? e->excitation : e->activation;
-    const double most =
-        e->excitation != NULL ? d->run->bounds.excitation_max : d->run->bounds.activation_max;
+    const mhi_bounds_section *b = &d->run->bounds;
+    const int32_t excited = e->excitation != NULL;
+    const double most = excited ? b->excitation_max : b->activation_max;
+    const int32_t given = most == (excited ? b->excitation_min : b->activation_min);
     for (int32_t i = 0; i < f->n_muscles; i++) {
         d->emg[i] = emg == NULL ? NAN : emg[i];
         count(&d->muscles[i], control[i] - d->emg[i]);
-        d->at_bound[i] += control[i] >= AT_BOUND * most;
+        d->at_bound[i] += !given && control[i] >= AT_BOUND * most;
     }
     mhi_lag_add(&d->lag, f->n_muscles, e->time, d->emg, control);
     for (int32_t i = 0; i < f->n_q; i++) {

@@ -25,8 +25,9 @@ const double *mhi_diagnosis_distances(const mhi_diagnosis *d);
 /* EMG that the last estimate's controls were to follow [n_muscles]; NaN: none. */
 const double *mhi_diagnosis_emg(const mhi_diagnosis *d);
 
-/* What of the run makes it doubtful, added to `findings`. [cold] */
-void mhi_diagnosis_judge(const mhi_diagnosis *d, mhi_findings *findings);
+/* What of the run makes it doubtful, added to `findings`; `unmet`: why windows failed, "" where it
+ * is not known. [cold] */
+void mhi_diagnosis_judge(const mhi_diagnosis *d, const char *unmet, mhi_findings *findings);
 /* Of marker or muscle i: samples that were there, RMS distance (m, or of 1), samples not believed.
  */
 typedef struct mhi_channel_tally {

@@ -41,16 +41,16 @@ mhi_channel_tally mhi_diagnosis_muscle(const mhi_diagnosis *d, int32_t i) {
     return (mhi_channel_tally){t->n, t->left_out, t->n == 0 ? NAN : mhi_tally_rms(t)};
 }
 
-static void judge_solves(const mhi_diagnosis *d, mhi_findings *findings) {
+static void judge_solves(const mhi_diagnosis *d, const char *unmet, mhi_findings *findings) {
     const double converged = (double)d->n_converged / d->n;
     const double predicted = (double)d->n_predicted / d->n;
     if (predicted > FEW_PREDICTED) {
         mhi_findings_add(
             findings, predicted > MANY_PREDICTED ? MHI_FINDING_USELESS : MHI_FINDING_DOUBTFUL,
-            "what was measured does not fit the model there; quality.sto says when",
+            "what was measured does not fit the model, or its bounds, there; quality.sto says when",
             "%.3g %% of the windows could not be solved: the model's prediction stands "
-            "there",
-            100 * predicted);
+            "there%s%s%s",
+            100 * predicted, *unmet != '\0' ? " (" : "", unmet, *unmet != '\0' ? ")" : "");
     }
     if (converged + predicted < MOST_CONVERGED) {
         mhi_findings_add(
@@ -270,9 +270,9 @@ static void judge_torques(const mhi_diagnosis *d, mhi_findings *findings) {
     mhi_text_free(&large);
 }
 
-void mhi_diagnosis_judge(const mhi_diagnosis *d, mhi_findings *findings) {
+void mhi_diagnosis_judge(const mhi_diagnosis *d, const char *unmet, mhi_findings *findings) {
     if (d->n > 0) {
-        judge_solves(d, findings);
+        judge_solves(d, unmet, findings);
         judge_markers(d, findings);
         judge_emg(d, findings);
         judge_times(d, findings);

@@ -84,6 +84,9 @@ const mhi_estimated *mhi_calibration_find(const mhi_calibration *c, int32_t kind
 void mhi_calibration_tell_copies(const mhi_calibration *c);
 /* MHE_E_INPUT: markers of one body differ in their distance from recording to recording. */
 mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err);
+/* doubts.c: tells the host what is odd about plan and recordings: markers and EMG that are never
+ * there, priors wider than their bounds. MHE_E_INPUT: EMG that says nothing. */
+mhe_status mhi_calibration_doubt(const mhi_calibration *c, mhe_error *err);
 /* motion.c: recordings and the motion that the estimator finds in them with the model as it is. */
 mhe_status mhi_motion_read(mhi_calibration *c, int32_t i, mhe_error *err);
 mhe_status mhi_motion_guess(mhi_calibration *c, int32_t i, int32_t n_x, int32_t n_u, double *x,

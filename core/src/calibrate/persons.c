@@ -6,8 +6,9 @@
 #include <math.h>
 #include <string.h>
 
-#define FARTHEST 0.008 /* m that skin, and a day between two recordings, may change a distance */
-#define SHARE 0.08     /* ... and which part of it */
+#define FARTHEST 0.008   /* m that skin, and a day between two recordings, may change a distance */
+#define SHARE 0.08       /* ... and which part of it */
+#define ANOTHER_UNIT 2.2 /* times: no two persons differ so */
 
 /* Mean distance of two markers over a recording; NaN: never seen together. */
 static double distance(const mhi_recording *r, int32_t n_k, int32_t a, int32_t b) {
@@ -100,6 +101,14 @@ mhe_status mhi_calibration_check_person(const mhi_calibration *c, mhe_error *err
             continue;
         }
         const odd most = farthest(c->model, first->recording, m->recording);
+        const double times = most.other / most.one;
+        if (most.off > 0 && (times > ANOTHER_UNIT || times < 1 / ANOTHER_UNIT)) {
+            return mhe_fail(err, MHE_E_INPUT,
+                            "%s: markers %s and %s are %.4g times as far apart as in %s: another "
+                            "unit (mm, m, inches)?",
+                            m->run.data.markers, c->model->markers[most.b].name,
+                            c->model->markers[most.a].name, times, first->run.data.markers);
+        }
         if (most.off > 0) {
             return mhe_fail(err, MHE_E_INPUT,
                             "%s: markers %s and %s are %.0f mm apart, and %.0f mm in %s: one "

@@ -58,12 +58,12 @@ static const mhe_option entry_options[] = {
         "where a marker, or the last point of a muscle's path, sits in its body, beside the "
         "model's place; by how much the EMG is earlier than what it excites, beside what the "
         "config says; a factor of a body's mass and inertia."),
-    MHE_OPT_REAL(mhi_plan_entry, mean, NAN, -100, 100, "1, m or s",
+    MHE_OPT_REAL(mhi_plan_entry, mean, NAN, -1e6, 1e6, "1, m or s",
                  "What is expected beforehand; by kind."),
     MHE_OPT_REAL(mhi_plan_entry, sd, NAN, 1e-6, 1e6, "1, m or s",
                  "Standard deviation of that; by kind."),
-    MHE_OPT_REAL(mhi_plan_entry, lower, NAN, -100, 100, "1, m or s", "Least value; by kind."),
-    MHE_OPT_REAL(mhi_plan_entry, upper, NAN, -100, 100, "1, m or s", "Largest value; by kind."),
+    MHE_OPT_REAL(mhi_plan_entry, lower, NAN, -1e6, 1e6, "1, m or s", "Least value; by kind."),
+    MHE_OPT_REAL(mhi_plan_entry, upper, NAN, -1e6, 1e6, "1, m or s", "Largest value; by kind."),
     MHE_OPT_TEXTS(mhi_plan_entry, muscles, 0, "Whose; none: all muscles."),
     MHE_OPT_TEXTS(mhi_plan_entry, markers, 0, "Of marker_offset: which; none: all markers."),
     MHE_OPT_TEXTS(mhi_plan_entry, bodies, 0, "Of segment_mass: which; none: all that have a mass."),
@@ -71,6 +71,36 @@ static const mhe_option entry_options[] = {
 };
 
 #define N(table) ((int32_t)(sizeof(table) / sizeof((table)[0])))
+
+/* What no person's number is beyond, and how to write it: percent, N, mm and ms are not. */
+static mhe_status check_unit(const mhi_run *run, const mhi_plan_entry *e, mhe_error *err) {
+    static const struct {
+        double most;
+        const char *unit;
+    } of[MHI_OF_KINDS] = {
+        [MHI_OF_STRENGTH] = {20, "a factor of the model's number: 1.2 is 20 % more"},
+        [MHI_OF_OPTIMAL] = {20, "a factor of the model's number: 1.2 is 20 % more"},
+        [MHI_OF_SLACK] = {20, "a factor of the model's number: 1.2 is 20 % more"},
+        [MHI_OF_GAIN] = {1e3, "a factor: 1.2 is 20 % more"},
+        [MHI_OF_SHAPE] = {20, "a number about -3 .. 0"},
+        [MHI_OF_MARKER] = {1, "in m: 10 mm are 0.01"},
+        [MHI_OF_INSERTION] = {1, "in m: 10 mm are 0.01"},
+        [MHI_OF_DELAY] = {2, "in s: 50 ms are 0.05"},
+        [MHI_OF_MASS] = {20, "a factor of the model's number: 1.2 is 20 % more"}};
+    const struct {
+        const char *key;
+        double value;
+    } given[] = {{"mean", e->mean}, {"lower", e->lower}, {"upper", e->upper}};
+    for (int32_t i = 0; i < N(given); i++) {
+        if (fabs(given[i].value) > of[e->kind].most) {
+            return mhi_fail_at(err, MHE_E_CONFIG, run->tree, e->node,
+                               "calibrate.parameters: %s: '%s' is %g; it is %s",
+                               mhi_plan_names[e->kind], given[i].key, given[i].value,
+                               of[e->kind].unit);
+        }
+    }
+    return MHE_OK;
+}
 
 static mhe_status check_entry(const mhi_run *run, mhi_plan_entry *e, mhe_error *err) {
     const char *name = mhi_plan_names[e->kind];
@@ -80,6 +110,10 @@ static mhe_status check_entry(const mhi_run *run, mhi_plan_entry *e, mhe_error *
     e->sd = isnan(e->sd) ? usual[e->kind].sd : e->sd;
     e->lower = isnan(e->lower) ? usual[e->kind].lower : e->lower;
     e->upper = isnan(e->upper) ? usual[e->kind].upper : e->upper;
+    const mhe_status status = check_unit(run, e, err);
+    if (status != MHE_OK) {
+        return status;
+    }
     if (e->lower >= e->upper) {
         return mhi_fail_at(
             err, MHE_E_CONFIG, run->tree, e->node,

@@ -427,6 +427,9 @@ mhe_status mhi_calibration_open(mhi_run *run, const mhi_run *start, mhi_registry
         mhi_calibration_tell_copies(c);
         status = mhi_calibration_check_person(c, err);
     }
+    if (status == MHE_OK) {
+        status = mhi_calibration_doubt(c, err);
+    }
     return status;
 }
 

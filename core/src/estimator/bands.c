@@ -3,15 +3,19 @@
 
 #include <string.h>
 
+/* All lengths together, and tendons alone: curves may look at those otherwise than by the norm
+ * length of the fibres (the passive force of the paper's begins where a fibre is as long as the
+ * slack tendon). */
 static mhe_status create_variants(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
     const mhi_uncertainty_section *c = b->config;
+    const mhi_variation all = {
+        .fiber = c->optimal_fiber_length, .tendon = c->tendon_slack_length, .path = c->path_length};
     mhe_status status = MHE_OK;
     for (int32_t i = 0; i < MHI_N_VARIANTS && status == MHE_OK; i++) {
-        const mhi_variation by = {.fiber = c->optimal_fiber_length,
-                                  .tendon = c->tendon_slack_length,
-                                  .path = c->path_length,
-                                  .far = i == 0 ? MHI_FAR : -MHI_FAR};
-        if (by.fiber > 0 || by.tendon > 0 || by.path > 0) {
+        mhi_variation by = i < 2 ? all : (mhi_variation){.tendon = all.tendon};
+        const int32_t other = i < 2 || all.fiber > 0 || all.path > 0;
+        by.far = i % 2 == 0 ? MHI_FAR : -MHI_FAR;
+        if (other && (by.fiber > 0 || by.tendon > 0 || by.path > 0)) {
             status = mhi_variant_create(e->system, &by, &b->variants[i], err);
         }
     }
@@ -25,14 +29,16 @@ static mhe_status take(mhe_estimator *e, mhi_bands *b, mhe_error *err) {
                               {&b->size, n},
                               {&b->free, b->n_m},
                               {&b->noise_share, b->n_m},
-                              {&b->far, n},
-                              {&b->near, n},
+                              {&b->far, b->gain.fixed},
+                              {&b->near, b->gain.fixed},
                               {&b->below, b->n_m},
                               {&b->above, b->n_m},
+                              {&b->room, b->n_m},
                               {&b->at, b->n_x * n},
                               {&b->controls, b->n_u * n},
                               {&b->row, n},
                               {&b->marker_q, 3 * e->n_k * b->n_q},
+                              {&b->unknown, b->n_q * b->n_q},
                               {&b->marker, 3 * e->n_k},
                               {&b->force, b->n_m},
                               {&b->more, b->n_m},
@@ -181,13 +187,19 @@ typedef struct sum {
     int32_t above; /* the long tail is that of truths above the estimate */
 } sum;
 
-static sum sum_of(const mhi_bands *b, const double *row) {
+/* `cut` is what bounds leave of the answers to other causes than column `own`, a share: their tails
+ * are what is cut off first. */
+static sum sum_of(const mhi_bands *b, const double *row, int32_t own, double cut) {
     double squares = 0, far = 0, near = 0;
-    for (int32_t i = 0; i < b->gain.n_columns; i++) {
-        const double square = row[i] * row[i], cube = square * row[i];
+    for (int32_t i = 0; i < b->gain.fixed; i++) {
+        const double square = row[i] * row[i];
+        const double cube = square * row[i] * (i == own ? 1 : cut * cut);
         squares += square;
         far += b->far[i] * cube;
         near += b->near[i] * cube;
+    }
+    for (int32_t i = b->gain.fixed; i < b->gain.n_columns; i++) { /* postures have no tails */
+        squares += row[i] * row[i];
     }
     const double sd = sqrt(squares), unit = squares > 0 ? 1 / (squares * sd) : 0;
     return (sum){sd, fabs(far) * unit, fmin(1, fabs(near) * unit), near > 0};
@@ -195,14 +207,13 @@ static sum sum_of(const mhi_bands *b, const double *row) {
 
 /* Such that 1.96 of it hold 95 % on either side, by the side that reaches further. */
 static double reach_of(const mhi_bands *b, const double *row) {
-    const sum s = sum_of(b, row);
+    const sum s = sum_of(b, row, -1, 1);
     return s.sd * (1 + s.far);
 }
 
-/* The same of a number whose truth is no more than `below` and `above` off. Where one side is held
+/* The same of a sum whose truth is no more than `below` and `above` off. Where one side is held
  * whole, all of the 5 % may lie on the other. */
-static double reach_within(const mhi_bands *b, const double *row, double below, double above) {
-    const sum s = sum_of(b, row);
+static double reach_within(sum s, double below, double above) {
     const double far = s.sd * (1 + s.far), near = s.sd * (1 - s.near);
     const double up = s.above ? far : near; /* truth above the estimate */
     const double down = s.above ? near : far;
@@ -244,13 +255,24 @@ static void measure_moments(mhi_bands *b) {
 }
 
 /* The row of a muscle's activation as it is while its control is between its bounds: what they
- * leave now says reach_within(). Only the error of its own force it makes good as bounds let it. */
-static void let_go(const mhi_bands *b, int32_t m, double *row) {
-    const double own = row[b->n_m + m], more = 1 / b->gain.known.free[m];
+ * leave now says reach_within(). Only the error of its own force it makes good as bounds let it.
+ * However much the other causes ask of it, the truth is no further than the bound that is further
+ * off: what they make of it is cut off there. Gives the share that is left. */
+static double let_go(const mhi_bands *b, int32_t m, double *row) {
+    const int32_t own = b->n_m + m;
+    const double most = b->room[m] / TWO_SIDED, good = row[own];
+    double squares = 0;
+    row[own] = 0;
     for (int32_t i = 0; i < b->gain.n_columns; i++) {
-        row[i] *= more;
+        squares += row[i] * row[i];
     }
-    row[b->n_m + m] = own;
+    const double sd = sqrt(squares) / b->gain.known.free[m];
+    const double cut = sd > most ? most / sd : 1;
+    for (int32_t i = 0; i < b->gain.n_columns; i++) {
+        row[i] *= cut / b->gain.known.free[m];
+    }
+    row[own] = good;
+    return cut;
 }
 
 /* Standard deviations from the errors of the output's node, in b->at and b->controls. */
@@ -268,8 +290,8 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
     for (int32_t m = 0; m < b->n_m; m++) {
         double *row = b->force_error + m * n;
         memcpy(row, activation_row(e, b, m), sizeof(double) * (size_t)n);
-        let_go(b, m, row);
-        b->activation[m] = reach_within(b, row, b->below[m], b->above[m]);
+        const double cut = let_go(b, m, row);
+        b->activation[m] = reach_within(sum_of(b, row, b->n_m + m, cut), b->below[m], b->above[m]);
         row[b->n_m + m] += b->size[b->n_m + m];
         for (int32_t i = 0; i < n; i++) {
             row[i] *= muscles->force_a[m];
@@ -280,7 +302,8 @@ static void measure(const mhe_estimator *e, mhi_bands *b, const mhi_muscle_state
         }
         const double number = SURE * b->size[b->n_m + m] * muscles->force_a[m];
         b->force_sd[m] = reach_within(
-            b, row, fmin(b->below[m] * muscles->force_a[m] + number, fmax(0, muscles->force[m])),
+            sum_of(b, row, b->n_m + m, cut),
+            fmin(b->below[m] * muscles->force_a[m] + number, fmax(0, muscles->force[m])),
             b->above[m] * muscles->force_a[m] + number * (1 + b->far[b->n_m + m]));
     }
 }

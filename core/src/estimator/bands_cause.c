@@ -57,6 +57,34 @@ static int32_t see_markers(mhe_estimator *e, mhi_bands *b, int32_t k, double *no
     return n;
 }
 
+/* Where offsets are learnt, what is left to know of them takes the place of `marker_offset`: the
+ * gradient's covariance is w^2 J^T P J. */
+static void learnt_offsets_of(mhe_estimator *e, mhi_bands *b, int32_t k, double weight) {
+    const mhi_channel *c = mhi_channels_find(&e->channels, MHI_SIGNAL_MARKERS);
+    const int32_t n_q = b->n_q;
+    double *root = b->unknown, all = 0;
+    if (!(e->rates.offsets.sd > 0) || !(weight > 0) ||
+        !mhi_offsets_unknown(&e->rates.offsets, mhi_row(e->window.solution.x, k, b->n_x),
+                             mhi_row(c->believed, k, c->face.width), root)) {
+        return;
+    }
+    for (int32_t i = 0; i < n_q; i++) {
+        all += root[i * n_q + i];
+    }
+    for (int32_t i = 0; i < n_q; i++) {
+        root[i * n_q + i] += 1e-9 * all;
+    }
+    if (mhi_cholesky_factor(root, n_q) != 0) {
+        return;
+    }
+    for (int32_t i = 0; i < n_q; i++) {
+        for (int32_t j = 0; j < n_q; j++) {
+            const double entry = j > i ? 0 : j == i ? 1 / root[i * n_q + i] : root[i * n_q + j];
+            b->gain.here.pose_fixed[i * n_q + j] = weight * entry;
+        }
+    }
+}
+
 /* Of independent errors of the markers, each of 1 m, the costs' gradient by q has the covariance
  * w^2 J^T J, w being what a square metre weighs: its root's columns are the directions. */
 static void postures_of(mhe_estimator *e, mhi_bands *b, int32_t k) {
@@ -82,6 +110,7 @@ static void postures_of(mhe_estimator *e, mhi_bands *b, int32_t k) {
             here->pose_fixed[i * n_q + j] = weight * b->config->marker_offset * entry;
         }
     }
+    learnt_offsets_of(e, b, k, weight);
 }
 
 /* Joint moments around node k. */
@@ -181,6 +210,7 @@ static void limit_activation(const mhe_estimator *e, mhi_bands *b, int32_t k, in
     const double least = mhi_ocp_u_lower(e->ocp, k)[m], most = mhi_ocp_u_upper(e->ocp, k)[m];
     b->below[m] = fmax(0, activation - least);
     b->above[m] = fmax(0, most - activation);
+    b->room[m] = fmax(b->below[m], b->above[m]);
     if (!isnan(emg)) {
         const double off = SURE * b->size[m];
         b->below[m] = fmin(b->below[m], fmax(0, u - emg + off));
@@ -292,14 +322,19 @@ void mhi_bands_learn(mhe_estimator *e, mhi_bands *b) {
         if (isnan(emg[m])) {
             continue;
         }
-        seen += (u[m] - emg[m]) * (u[m] - emg[m]) / (scale * scale);
+        const double unit = 1 / (scale * scale);
+        double squares = 0, of_noise = 0;
         for (int32_t i = 0; i < b->gain.n_columns; i++) {
-            const double error = row[i] - (i == m ? b->size[m] : 0);
-            const double square = error * error / (scale * scale);
-            const double share = i < b->n_m ? b->noise_share[i] : 0;
-            noise += share * square / (level * FEW * FEW);
-            others += (1 - share) * square;
+            squares += row[i] * row[i];
         }
+        squares += b->size[m] * (b->size[m] - 2 * row[m]); /* of EMG itself, too */
+        for (int32_t i = 0; i < b->n_m; i++) {
+            const double error = row[i] - (i == m ? b->size[m] : 0);
+            of_noise += b->noise_share[i] * error * error;
+        }
+        seen += (u[m] - emg[m]) * (u[m] - emg[m]) * unit;
+        noise += of_noise * unit / (level * FEW * FEW);
+        others += (squares - of_noise) * unit;
     }
     if (!(noise > 0) || !b->config->emg_measured) {
         return;

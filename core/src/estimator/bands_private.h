@@ -14,7 +14,8 @@
 #define MHI_FAR TWO_SIDED
 #define SURE 2.33                     /* and 98 % */
 #define ONE_SIDED (1.645 / TWO_SIDED) /* what leaves 5 % on one side, beside that */
-#define MHI_N_VARIANTS 2 /* fibres that are longer beside their optimal length, and shorter */
+/* Fibres that are longer beside their optimal length, and shorter; by the tendon alone, too. */
+#define MHI_N_VARIANTS 4
 
 /* How large the noise of EMG is beside what the config says, by its residuals: sums that forget. */
 typedef struct mhi_emg_level {
@@ -42,15 +43,17 @@ struct mhi_bands {
     double *size;           /* [columns] of each cause, in units of the gain's */
     double *free;           /* [n_m] share of what a control answers beside its bounds */
     double *noise_share;    /* [n_m] of noise in the square of an EMG cause */
-    double *far, *near;     /* [columns] how much further than `size` a cause reaches where
+    double *far, *near;     /* [fixed] how much further than `size` a cause reaches where
                              * it is alone, and less on the other side, shares. Far is a
                              * truth above what is at hand; negative: one below it */
     double *below, *above;  /* [n_m] the most that an activation may be off below and above
                              * its estimate, by its EMG and its bounds */
+    double *room;           /* [n_m] to the bound that is further off */
     double *at;             /* [n_x x columns] error of the output's node */
     double *controls;       /* [n_u x columns] of node 0; then of the output's node */
     double *row;            /* [columns] */
     double *marker_q;       /* [3 n_k x n_q] */
+    double *unknown;        /* [n_q x n_q] of learnt offsets; scratch */
     double *marker, *force; /* [3 n_k], [n_m] scratch */
     double *more, *less;    /* [n_m] the most that forces are above and below; scratch */
     double *force_error;    /* [n_m x columns] */

@@ -68,6 +68,14 @@ mhe_status mhe_estimator_covers(const mhe_estimator *e, double first, double las
     return status;
 }
 
+int32_t mhe_estimator_marker_offsets(const mhe_estimator *e, double *offsets) {
+    if (e == NULL || offsets == NULL || !(e->rates.offsets.sd > 0)) {
+        return 0;
+    }
+    memcpy(offsets, e->rates.offsets.value, sizeof *offsets * (size_t)e->rates.offsets.n);
+    return 1;
+}
+
 /* As OpenSim calls them: "hip_r_on_femur_r_in_femur_r". */
 static mhe_status name_joints(mhe_estimator *e, mhe_error *err) {
     const mhe_description *d = e->description;
@@ -178,6 +186,9 @@ static mhe_status create_parts(mhe_estimator *e, mhe_error *err) {
     if (status == MHE_OK) {
         status =
             mhi_begin_create(&e->begin, e->system, mhi_ocp_context(e->ocp), n + 1, &e->arena, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_unmet_create(&e->unmet, mhi_ocp_face(e->ocp)->n_x, &e->arena, err);
     }
     if (status == MHE_OK) {
         mhi_start_set_tasks(e->begin.start, e->tasks);

@@ -21,6 +21,7 @@
 #include "estimator/rates.h"
 #include "estimator/tasks.h"
 #include "estimator/trust.h"
+#include "estimator/unmet.h"
 #include "estimator/window.h"
 #include "model/joints.h"
 
@@ -59,6 +60,7 @@ struct mhe_estimator {
     mhi_rates rates;
     mhi_pace pace;
     mhi_output output;
+    mhi_unmet unmet;
     mhi_bands *bands;     /* NULL: not wanted */
     const double **given; /* [channels] what the frame in work says, scratch */
     mhi_arena arena;

@@ -21,12 +21,18 @@
  * not to throw them far. */
 #define DAMPING 5
 
-static mhe_status take_look(mhi_offset_look *look, int32_t n, int32_t n_q, mhi_arena *arena,
-                            mhe_error *err) {
-    const mhi_room rooms[] = {{&look->q, n_q},          {&look->measured, n},
-                              {&look->left, n},         {&look->weight, n},
-                              {&look->follow, n_q * n}, {&look->jacobian, n * n_q}};
-    return MHI_TAKE_ROOMS(arena, rooms, err);
+static mhe_status take_nodes(mhi_offsets *o, mhi_arena *arena, mhe_error *err) {
+    o->node = MHI_TAKE(arena, mhi_offset_node, o->nodes);
+    mhe_status status = o->node == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory") : MHE_OK;
+    for (int32_t k = 0; k < o->nodes && status == MHE_OK; k++) {
+        mhi_offset_node *node = &o->node[k];
+        node->rotation = MHI_TAKE(arena, double, o->n_k * 9);
+        node->held = MHI_TAKE(arena, int32_t, o->n_q);
+        status = node->rotation == NULL || node->held == NULL
+                     ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
+                     : mhi_offset_follow_create(&node->follow, o->n, o->n_q, arena, err);
+    }
+    return status;
 }
 
 mhe_status mhi_offsets_create(mhi_offsets *o, double sd, const mhi_system *system,
@@ -44,25 +50,21 @@ mhe_status mhi_offsets_create(mhi_offsets *o, double sd, const mhi_system *syste
     if (sd == 0 || n_k == 0) {
         return MHE_OK;
     }
-    const mhi_room rooms[] = {{&o->value, n},
-                              {&o->rotation, (ptrdiff_t)(nodes + 1) * n_k * 9},
-                              {&o->follow, (ptrdiff_t)nodes * n_q * n},
-                              {&o->normal, n * n},
-                              {&o->right, n},
-                              {&o->work, n * n},
-                              {&o->change, n},
-                              {&o->marker, n},
-                              {&o->slope, n * n_q},
-                              {&o->body, 12 * d->n_bodies},
-                              {&o->square, n_q * n_q},
-                              {&o->column, n_q},
+    const mhi_room rooms[] = {{&o->value, n},          {&o->sum.normal, n * n},
+                              {&o->sum.right, n},      {&o->work, n * n},
+                              {&o->change, n + n_q},   {&o->marker, n},
+                              {&o->slope, n * n_q},    {&o->jacobian, n * n_q},
+                              {&o->rotation, n_k * 9}, {&o->body, 12 * d->n_bodies},
                               {&o->step, n_q}};
     mhe_status status = MHI_TAKE_ROOMS(arena, rooms, err);
     if (status == MHE_OK) {
-        status = take_look(&o->now, n, n_q, arena, err);
+        status = take_nodes(o, arena, err);
+    }
+    if (status == MHE_OK) {
+        status = mhi_offset_look_create(&o->now, n, n_q, arena, err);
     }
     for (int32_t i = 0; i < MHI_OFFSET_LOOKS && status == MHE_OK; i++) {
-        status = take_look(&o->looks[i], n, n_q, arena, err);
+        status = mhi_offset_look_create(&o->looks[i], n, n_q, arena, err);
     }
     if (status == MHE_OK) {
         o->sd = sd;
@@ -73,26 +75,19 @@ mhe_status mhi_offsets_create(mhi_offsets *o, double sd, const mhi_system *syste
     return status;
 }
 
-static double *rotation(const mhi_offsets *o, int32_t k) {
-    return o->rotation + (ptrdiff_t)k * o->n_k * 9;
-}
-
-static double *follow(const mhi_offsets *o, int32_t k) {
-    return o->follow + (ptrdiff_t)k * o->n_q * o->n;
-}
-
 void mhi_offsets_forget(mhi_offsets *o, int32_t k) {
     if (o->sd > 0) {
-        rotation(o, k)[0] = NAN;
-        memset(follow(o, k), 0, sizeof(double) * (size_t)(o->n_q * o->n));
+        o->node[k].rotation[0] = NAN;
+        o->node[k].follow.known = 0;
+        memset(o->node[k].held, 0, sizeof(int32_t) * (size_t)o->n_q);
     }
 }
 
 void mhi_offsets_shift(mhi_offsets *o) {
     if (o->sd > 0) {
-        const size_t rest = sizeof(double) * (size_t)(o->nodes - 1);
-        memmove(o->rotation, rotation(o, 1), rest * (size_t)(o->n_k * 9));
-        memmove(o->follow, follow(o, 1), rest * (size_t)(o->n_q * o->n));
+        const mhi_offset_node first = o->node[0];
+        memmove(o->node, o->node + 1, sizeof first * (size_t)(o->nodes - 1));
+        o->node[o->nodes - 1] = first;
         mhi_offsets_forget(o, o->nodes - 1);
     }
 }
@@ -109,13 +104,14 @@ static mhe_status rotate(mhi_offsets *o, const double *q, double *to) {
 }
 
 void mhi_offsets_turn(mhi_offsets *o, int32_t k, const double *q) {
-    if (rotate(o, q, rotation(o, k)) != MHE_OK) {
-        rotation(o, k)[0] = NAN;
+    double *r = o->node[k].rotation;
+    if (rotate(o, q, r) != MHE_OK) {
+        r[0] = NAN;
     }
 }
 
 void mhi_offsets_correct(const mhi_offsets *o, int32_t k, const double *markers, double *out) {
-    const double *r = rotation(o, k);
+    const double *r = o->node[k].rotation;
     for (int32_t i = 0; i < o->n_k; i++) {
         const double *b = o->value + 3 * i, *a = r + 9 * i;
         for (int32_t j = 0; j < 3; j++) {
@@ -133,7 +129,7 @@ static void turn_rows(mhi_offsets *o, mhi_offset_look *look, int32_t i, const do
     const double weight = !there ? 0 : o->tasks == NULL ? 1 : o->tasks->marker[i];
     for (int32_t j = 0; j < 3; j++) {
         const int32_t row = 3 * i + j;
-        double *slope = look->jacobian + (ptrdiff_t)row * n_q;
+        double *slope = o->jacobian + (ptrdiff_t)row * n_q;
         memset(slope, 0, sizeof *slope * (size_t)n_q);
         look->left[row] = 0;
         look->weight[row] = weight;
@@ -147,43 +143,10 @@ static void turn_rows(mhi_offsets *o, mhi_offset_look *look, int32_t i, const do
     }
 }
 
-/* -(J^T W J)^-1 J^T W. What no marker shows stays as it is. */
-static int32_t find_follow(mhi_offsets *o, mhi_offset_look *look) {
-    const int32_t n_q = o->n_q, n = o->n;
-    double *square = o->square, largest = 1e-12;
-    memset(square, 0, sizeof *square * (size_t)(n_q * n_q));
-    for (int32_t i = 0; i < n; i++) {
-        const double *row = look->jacobian + (ptrdiff_t)i * n_q;
-        for (int32_t a = 0; a < n_q; a++) {
-            for (int32_t b = 0; b <= a && row[a] != 0; b++) {
-                square[a * n_q + b] += look->weight[i] * row[a] * row[b];
-            }
-        }
-    }
-    for (int32_t a = 0; a < n_q; a++) {
-        largest = fmax(largest, square[a * n_q + a]);
-    }
-    for (int32_t a = 0; a < n_q; a++) {
-        square[a * n_q + a] += 1e-6 * largest;
-    }
-    if (mhi_cholesky_factor(square, n_q) != 0) {
-        return 0;
-    }
-    for (int32_t i = 0; i < n; i++) {
-        for (int32_t a = 0; a < n_q; a++) {
-            o->column[a] = -look->weight[i] * look->jacobian[(ptrdiff_t)i * n_q + a];
-        }
-        mhi_cholesky_solve(square, n_q, o->column, 1);
-        for (int32_t a = 0; a < n_q; a++) {
-            look->follow[(ptrdiff_t)a * n + i] = o->column[a];
-        }
-    }
-    return 1;
-}
-
 /* Looks at the measured markers from the posture, with the bodies' axes r [n_k x 9]. 0: it cannot.
  */
 static int32_t look_from(mhi_offsets *o, mhi_offset_look *look, double *r) {
+    look->follow.known = 0;
     if (rotate(o, look->q, r) != MHE_OK ||
         mhi_system_markers(o->context, look->q, o->marker, o->slope, NULL) != MHE_OK) {
         return 0;
@@ -191,66 +154,33 @@ static int32_t look_from(mhi_offsets *o, mhi_offset_look *look, double *r) {
     for (int32_t i = 0; i < o->n_k; i++) {
         turn_rows(o, look, i, r + 9 * i);
     }
-    return find_follow(o, look);
+    return mhi_offset_follow_find(&look->follow, o->jacobian, look->weight, o->n, o->n_q);
 }
 
-/* A look into the normal equations (`sign` 1), or out of them (-1): W P, where P = I + J follow. */
 static void count_look(mhi_offsets *o, const mhi_offset_look *look, double sign) {
-    const int32_t n = o->n, n_q = o->n_q;
-    double *projection = o->change;
-    for (int32_t i = 0; i < n; i++) {
-        const double *slope = look->jacobian + (ptrdiff_t)i * n_q;
-        const double weight = sign * look->weight[i];
-        double right = 0;
-        if (weight == 0) {
-            continue;
-        }
-        memset(projection, 0, sizeof(double) * (size_t)n);
-        projection[i] = 1;
-        for (int32_t a = 0; a < n_q; a++) {
-            const double *go = look->follow + (ptrdiff_t)a * n;
-            for (int32_t j = 0; j < n && slope[a] != 0; j++) {
-                projection[j] += slope[a] * go[j];
-            }
-        }
-        for (int32_t j = 0; j < n; j++) {
-            o->normal[(ptrdiff_t)i * n + j] += weight * projection[j];
-            right += projection[j] * look->left[j];
-        }
-        o->right[i] += weight * right;
-        o->squares += weight * right * look->left[i];
-        o->rows += sign;
-    }
-}
-
-/* How far a look's posture is from the nearest one with today's offsets -> step; the farthest. */
-static double find_step(const mhi_offsets *o, const mhi_offset_look *look, double *step) {
-    double farthest = 0;
-    for (int32_t a = 0; a < o->n_q; a++) {
-        const double *go = look->follow + (ptrdiff_t)a * o->n;
-        step[a] = 0;
-        for (int32_t i = 0; i < o->n; i++) {
-            step[a] += go[i] * (o->value[i] - look->left[i]);
-        }
-        farthest = fmax(farthest, fabs(step[a]));
-    }
-    return farthest;
+    mhi_offset_look_count(look, sign, o->n, o->n_q, o->change, &o->sum);
 }
 
 /* One of the looks again, from the nearest posture with today's offsets. */
 static void look_again(mhi_offsets *o) {
     mhi_offset_look *look = &o->looks[o->next % o->n_looks];
+    double farthest = 0;
     o->next = (o->next + 1) % o->n_looks;
-    if (!(find_step(o, look, o->step) < FARTHEST)) {
+    for (int32_t i = 0; i < o->n; i++) {
+        o->change[i] = o->value[i] - look->left[i];
+    }
+    mhi_offset_follow_move(&look->follow, o->change, o->n, o->n_q, o->step);
+    for (int32_t a = 0; a < o->n_q; a++) {
+        farthest = fmax(farthest, fabs(o->step[a]));
+    }
+    if (!(farthest < FARTHEST)) {
         return;
     }
     count_look(o, look, -1);
     for (int32_t a = 0; a < o->n_q; a++) {
         look->q[a] += o->step[a];
     }
-    if (!look_from(o, look, rotation(o, o->nodes))) { /* room of its own behind the nodes' */
-        memset(look->weight, 0, sizeof(double) * (size_t)o->n);
-    }
+    (void)look_from(o, look, o->rotation); /* where it cannot, nothing counts */
     count_look(o, look, 1);
 }
 
@@ -260,24 +190,38 @@ static void swap(mhi_offset_look *a, mhi_offset_look *b) {
     *b = kept;
 }
 
-/* Room for one more: every second one of the old ones goes. */
-static void thin_out(mhi_offsets *o) {
-    int32_t kept = 0;
+/* How long a look has stayed beyond its time, in looks. Every look stays for 16 more, every second
+ * for 32, every fourth for 48: the older, the fewer, and with each that comes just one goes. */
+static int64_t overdue(const mhi_offsets *o, const mhi_offset_look *look) {
+    int64_t life = 16;
+    for (int64_t rest = look->number; rest % 2 == 0 && life < 80; rest /= 2) {
+        life += 16;
+    }
+    return o->number - look->number - life;
+}
+
+/* Room for one more; where all is taken, that of the one that should have gone first. */
+static int32_t make_room(mhi_offsets *o) {
+    int32_t longest = 0;
     if (o->n_looks < MHI_OFFSET_LOOKS) {
-        return;
+        return o->n_looks++;
     }
-    for (int32_t i = 0; i < o->n_looks; i++) {
-        if (i % 2 == 0) {
-            count_look(o, &o->looks[i], -1);
-        } else {
-            swap(&o->looks[kept++], &o->looks[i]);
-        }
+    for (int32_t i = 1; i < o->n_looks; i++) {
+        longest = overdue(o, &o->looks[i]) > overdue(o, &o->looks[longest]) ? i : longest;
     }
-    o->n_looks = kept;
+    count_look(o, &o->looks[longest], -1);
+    return longest;
+}
+
+static void keep_look(mhi_offsets *o) {
+    o->now.number = ++o->number;
+    o->last = make_room(o);
+    count_look(o, &o->now, 1);
+    swap(&o->now, &o->looks[o->last]);
 }
 
 static int32_t is_news(const mhi_offsets *o) {
-    const double *last = o->n_looks > 0 ? o->looks[o->n_looks - 1].q : NULL;
+    const double *last = o->n_looks > 0 ? o->looks[o->last].q : NULL;
     int32_t news = last == NULL;
     for (int32_t a = 0; a < o->n_q && !news; a++) {
         news = fabs(o->now.q[a] - last[a]) > NEWS;
@@ -289,15 +233,8 @@ static int32_t is_news(const mhi_offsets *o) {
  * and at first by what is expected. Skin that moves is in it. */
 static double noise(const mhi_offsets *o) {
     const double first = FIRST_NOISE * o->sd;
-    double squares = o->squares;
-    for (int32_t i = 0; i < o->n; i++) {
-        double row = 0;
-        for (int32_t j = 0; j < o->n; j++) {
-            row += o->normal[(ptrdiff_t)i * o->n + j] * o->value[j];
-        }
-        squares += o->value[i] * (row - 2 * o->right[i]);
-    }
-    const double over = fmax(0, o->rows - o->n_q * o->n_looks - o->n);
+    const double squares = mhi_offset_sum_squares(&o->sum, o->value, o->n);
+    const double over = fmax(0, o->sum.rows - o->n_q * o->n_looks - o->n);
     return (o->n * first * first + ALIKE * fmax(0, squares)) / (o->n + over);
 }
 
@@ -305,12 +242,12 @@ static double noise(const mhi_offsets *o) {
 static void solve(mhi_offsets *o) {
     const ptrdiff_t n = o->n;
     const double says = 1 / noise(o), expected = 1 / (o->sd * o->sd);
-    for (ptrdiff_t i = 0; i < n * n; i++) {
-        o->work[i] = says * o->normal[i];
-    }
     for (ptrdiff_t i = 0; i < n; i++) {
+        for (ptrdiff_t j = 0; j <= i; j++) {
+            o->work[i * n + j] = says * o->sum.normal[i * n + j];
+        }
         o->work[i * n + i] += (1 + DAMPING) * expected;
-        o->change[i] = says * o->right[i] + DAMPING * expected * o->value[i];
+        o->change[i] = says * o->sum.right[i] + DAMPING * expected * o->value[i];
     }
     if (mhi_cholesky_factor(o->work, o->n) != 0) {
         memset(o->change, 0, sizeof(double) * (size_t)n);
@@ -325,35 +262,29 @@ static void solve(mhi_offsets *o) {
 }
 
 /* The postures of the nodes until k go along. */
-static void move_postures(const mhi_offsets *o, int32_t k, double *q) {
+static void move_postures(mhi_offsets *o, int32_t k, double *q) {
     for (int32_t m = 0; m <= k; m++) {
+        const mhi_offset_node *node = &o->node[m];
+        mhi_offset_follow_move(&node->follow, o->change, o->n, o->n_q, o->step);
         for (int32_t a = 0; a < o->n_q; a++) {
-            const double *go = follow(o, m) + (ptrdiff_t)a * o->n;
-            double move = 0;
-            for (int32_t i = 0; i < o->n; i++) {
-                move += go[i] * o->change[i];
-            }
-            q[(ptrdiff_t)m * o->n_q + a] += move;
+            q[(ptrdiff_t)m * o->n_q + a] += node->held[a] ? 0 : o->step[a];
         }
     }
 }
 
 void mhi_offsets_learn(mhi_offsets *o, int32_t k, const double *markers, double *q) {
-    const size_t n_q = (size_t)o->n_q, n = (size_t)o->n;
-    memcpy(o->now.q, q + (ptrdiff_t)k * o->n_q, sizeof(double) * n_q);
-    memcpy(o->now.measured, markers, sizeof(double) * n);
-    if (!look_from(o, &o->now, rotation(o, k))) {
+    memcpy(o->now.q, q + (ptrdiff_t)k * o->n_q, sizeof(double) * (size_t)o->n_q);
+    memcpy(o->now.measured, markers, sizeof(double) * (size_t)o->n);
+    if (!look_from(o, &o->now, o->node[k].rotation)) {
         mhi_offsets_forget(o, k);
         return;
     }
-    memcpy(follow(o, k), o->now.follow, sizeof(double) * n_q * n);
+    mhi_offset_follow_copy(&o->node[k].follow, &o->now.follow, o->n, o->n_q);
     if (o->n_looks > 0) {
         look_again(o);
     }
     if (is_news(o)) {
-        thin_out(o);
-        count_look(o, &o->now, 1);
-        swap(&o->now, &o->looks[o->n_looks++]);
+        keep_look(o);
     }
     solve(o);
     move_postures(o, k, q);
@@ -361,6 +292,36 @@ void mhi_offsets_learn(mhi_offsets *o, int32_t k, const double *markers, double 
 
 void mhi_offsets_hold(mhi_offsets *o, int32_t k, int32_t coordinate) {
     if (o->sd > 0) {
-        memset(follow(o, k) + (ptrdiff_t)coordinate * o->n, 0, sizeof(double) * (size_t)o->n);
+        o->node[k].held[coordinate] = 1;
     }
+}
+
+int32_t mhi_offsets_unknown(mhi_offsets *o, const double *q, const double *markers, double *out) {
+    const ptrdiff_t n = o->n, n_q = o->n_q;
+    memcpy(o->now.q, q, sizeof(double) * (size_t)n_q);
+    memcpy(o->now.measured, markers, sizeof(double) * (size_t)n);
+    if (!look_from(o, &o->now, o->rotation)) {
+        return 0;
+    }
+    const double says = 1 / noise(o);
+    for (ptrdiff_t i = 0; i < n; i++) {
+        for (ptrdiff_t j = 0; j <= i; j++) {
+            o->work[i * n + j] = says * o->sum.normal[i * n + j];
+        }
+        o->work[i * n + i] += 1 / (o->sd * o->sd);
+    }
+    if (mhi_cholesky_factor(o->work, o->n) != 0) {
+        return 0;
+    }
+    memcpy(o->slope, o->jacobian, sizeof(double) * (size_t)(n * n_q));
+    mhi_cholesky_solve(o->work, o->n, o->slope, o->n_q);
+    memset(out, 0, sizeof(double) * (size_t)(n_q * n_q));
+    for (ptrdiff_t i = 0; i < n; i++) {
+        for (ptrdiff_t a = 0; a < n_q; a++) {
+            for (ptrdiff_t c = 0; c < n_q; c++) {
+                out[a * n_q + c] += o->jacobian[i * n_q + a] * o->slope[i * n_q + c];
+            }
+        }
+    }
+    return 1;
 }

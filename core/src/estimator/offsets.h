@@ -9,34 +9,29 @@
 #ifndef MHI_OFFSETS_H
 #define MHI_OFFSETS_H
 
-#include "base/arena.h"
+#include "estimator/offset_look.h"
 #include "model/system.h"
 #include "ocp/tasks.h"
 
-/* What a posture says: left = jacobian dq + offsets, in the axes of the markers' bodies. n = 3 n_k.
- */
-typedef struct mhi_offset_look {
-    double *q;        /* [n_q] */
-    double *measured; /* [n] markers, in ground; NaN: missing */
-    double *left;     /* [n] measured less the model's, 0 where it does not count */
-    double *weight;   /* [n] 0: missing or left out */
-    double *jacobian; /* [n x n_q] */
-    double *follow;   /* [n_q x n] how the nearest posture goes with the offsets */
-} mhi_offset_look;
-
 #define MHI_OFFSET_LOOKS 32
 
+/* What a node has of its posture. */
+typedef struct mhi_offset_node {
+    double *rotation; /* [n_k x 9] to ground; the first NaN: not known */
+    mhi_offset_follow follow;
+    int32_t *held; /* [n_q] 1: this coordinate does not follow */
+} mhi_offset_node;
+
 typedef struct mhi_offsets {
-    double sd;        /* m, what is expected of an offset; 0: off */
-    double *value;    /* [n] in the axes of the markers' bodies, m */
-    double *rotation; /* [nodes x n_k x 9] to ground; the first NaN: not known */
-    double *follow;   /* [nodes x n_q x n] of the nodes' postures; 0: not known */
+    double sd;                                    /* m, what is expected of an offset; 0: off */
+    double *value;                                /* [n] in the axes of the markers' bodies, m */
+    mhi_offset_node *node;                        /* [nodes] */
     mhi_offset_look now, looks[MHI_OFFSET_LOOKS]; /* the older, the fewer */
-    int32_t n_looks, next;                        /* the one that is looked at again next */
-    double *normal, *right;                       /* [n x n], [n] of all looks */
-    double squares, rows;                         /* of what they left, over so many */
-    double *work, *change;                        /* [n x n], [n] scratch, as what follows */
-    double *marker, *slope, *body, *square, *column, *step;
+    int32_t n_looks, next, last; /* the one that is looked at again next; the newest */
+    int64_t number;              /* of the newest */
+    mhi_offset_sum sum;          /* of all looks */
+    double *work, *change;       /* [n x n], [n + n_q] scratch, as what follows */
+    double *marker, *slope, *jacobian, *body, *rotation, *step;
     const mhe_description *description;
     mhi_system_context *context;
     const mhi_tasks *tasks;
@@ -59,5 +54,10 @@ void mhi_offsets_correct(const mhi_offsets *offsets, int32_t k, const double *ma
 void mhi_offsets_learn(mhi_offsets *offsets, int32_t k, const double *markers, double *q);
 /* A coordinate of node k is measured otherwise: what is learnt does not move it. */
 void mhi_offsets_hold(mhi_offsets *offsets, int32_t k, int32_t coordinate);
+/* What is not known of the offsets, in the posture q, whose markers [n] some may be missing of:
+ * J^T P J -> out [n_q x n_q], J the markers' slopes and P the covariance that what is expected and
+ * all looks leave. 0: there is none. [hot] */
+int32_t mhi_offsets_unknown(mhi_offsets *offsets, const double *q, const double *markers,
+                            double *out);
 
 #endif

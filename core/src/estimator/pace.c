@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "estimator/estimator_private.h"
 
+#include "base/values.h"
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -195,17 +197,14 @@ void mhi_pace_solved(mhe_estimator *e) {
     atomic_store_explicit(&work->refused, 0, memory_order_relaxed);
 }
 
-static int by_value(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 static void learn(mhi_pace *p, double work) {
     double sorted[MHI_PACE_FRAMES];
-    p->frames[p->n_frames++ % MHI_PACE_FRAMES] = work;
-    const int32_t n = p->n_frames < MHI_PACE_FRAMES ? p->n_frames : MHI_PACE_FRAMES;
+    p->frames[p->next] = work;
+    p->next = (p->next + 1) % MHI_PACE_FRAMES;
+    p->n_frames += p->n_frames < MHI_PACE_FRAMES;
+    const int32_t n = p->n_frames;
     memcpy(sorted, p->frames, sizeof sorted);
-    qsort(sorted, (size_t)n, sizeof *sorted, by_value);
+    mhi_sort(sorted, n);
     if (n >= KNOWN) {
         const double median = sorted[n / 2];
         p->least = p->usual == 0 ? median : fmin(p->least, median);
@@ -226,14 +225,15 @@ static void spend(mhe_estimator *e, double work) {
 
 /* Nothing is told of a first window that took its time and settled. */
 static void tell_first(mhe_estimator *e) {
-    char line[256];
+    char line[256 + MHI_UNMET_TEXT];
+    const char *why = e->unmet.now;
     e->pace.first_told = 1;
     (void)snprintf(
         line, sizeof line,
         "from %.6g s on the first window found no motion that fits within the work it may "
-        "take; estimates go on from what there is. Do the recording's units, axes and "
-        "labels fit the model?",
-        e->window.times[0]);
+        "take%s%s%s; estimates go on from what there is. Do the bounds, and the recording's units, "
+        "axes and labels, fit the model?",
+        e->window.times[0], *why != '\0' ? " (" : "", why, *why != '\0' ? ")" : "");
     e->host->log(e->host, MHE_LOG_WARNING, line);
 }
 
@@ -249,8 +249,8 @@ void mhi_pace_end(mhe_estimator *e, int32_t frame_status) {
             tell_first(e);
         }
     }
-    if (converged || (ended && p->n_converged == 0)) {
-        p->n_converged += converged;
+    if (converged || (ended && !p->has_converged)) {
+        p->has_converged |= converged;
         learn(p, work);
     }
     p->ahead = p->prepared = 0;

@@ -19,7 +19,8 @@ typedef struct mhi_pace {
     int64_t kept;                   /* from the search of postures */
     double prepared;                /* work of the same */
     double frames[MHI_PACE_FRAMES]; /* work of the last that ended as they should, a ring */
-    int32_t n_frames, n_converged;  /* so far */
+    int32_t n_frames, next;         /* in it, and the place of the next */
+    int32_t has_converged;          /* one of them at least */
     double usual;                   /* 0: not known yet */
     double least;                   /* that usual was */
     double first, later, all_first; /* left for the frames until then, see pace.c; first at first */

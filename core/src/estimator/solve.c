@@ -207,6 +207,7 @@ mhe_status mhi_window_solve(mhe_estimator *e, mhe_solve_info *info, int32_t *fra
     const int usable = status == MHE_OK && finite && begun && info->primal_residual <= CONSISTENT;
     const int rough = status == MHE_OK && finite && info->primal_residual <= ROUGHLY * CONSISTENT;
     *frame_status = usable ? status_of(e, info->outcome) : MHE_FRAME_PREDICTED;
+    mhi_unmet_solved(e, *frame_status == MHE_FRAME_PREDICTED && finite);
     if (*frame_status != MHE_FRAME_PREDICTED) {
         e->begin.restarted = 0;
     } else if (mhi_phase_settled(e) && !(begins && rough)) {

@@ -14,26 +14,33 @@
 #define WORD_MAX 65535
 #define SAME_TIME 5e-7 /* s: files print times with six digits */
 
-/* Bytes that grow. */
+/* Bytes that grow. What did not fit once is lost, and all that comes behind it. */
 typedef struct writer {
     uint8_t *data;
     size_t n, room;
     int failed;
 } writer;
 
-static void put(writer *w, const void *bytes, size_t n) {
-    if (w->n + n > w->room) {
-        const size_t room = 2 * (w->n + n) + MHI_C3D_BLOCK;
-        uint8_t *data = realloc(w->data, room);
-        w->failed = w->failed || data == NULL;
-        if (data == NULL) {
-            return;
-        }
-        w->data = data;
-        w->room = room;
+static void grow(writer *w, size_t n) {
+    const size_t room = 2 * n + MHI_C3D_BLOCK;
+    uint8_t *data = realloc(w->data, room);
+    if (data == NULL) {
+        free(w->data);
+        *w = (writer){.failed = 1};
+        return;
     }
-    memcpy(w->data + w->n, bytes, n);
-    w->n += n;
+    w->data = data;
+    w->room = room;
+}
+
+static void put(writer *w, const void *bytes, size_t n) {
+    if (w->n + n > w->room && !w->failed) {
+        grow(w, w->n + n);
+    }
+    if (!w->failed) {
+        memcpy(w->data + w->n, bytes, n);
+        w->n += n;
+    }
 }
 
 static void put_byte(writer *w, int32_t value) {

@@ -5,6 +5,7 @@
 #include "believe/diagnosis.h"
 #include "estimator/create.h"
 #include "estimator/errors.h"
+#include "estimator/unmet.h"
 #include "library/config.h"
 #include "library/recording.h"
 
@@ -12,6 +13,7 @@
 #include <stdlib.h>
 
 struct mhe_findings {
+    const mhe_estimator *estimator;
     mhe_estimator_info info;
     mhi_findings *list; /* the recording's, which began it */
     mhi_diagnosis *diagnosis;
@@ -47,6 +49,7 @@ mhe_status mhe_findings_open(mhe_config *config, mhe_estimator *estimator,
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     const mhi_system *system = mhi_estimator_system(estimator);
+    f->estimator = estimator;
     f->info.size = sizeof f->info;
     f->list = &recording->data->findings;
     status = mhe_estimator_describe(estimator, &f->info);
@@ -125,7 +128,7 @@ mhe_status mhe_findings_rmse(const mhe_findings *f, int32_t skip_first, int32_t 
 mhe_status mhe_findings_judge(mhe_findings *f, int32_t *weight, mhe_error *err) {
     mhe_status status = MHI_NEED(err, {"findings", f}, {"weight", weight});
     if (status == MHE_OK) {
-        mhi_diagnosis_judge(f->diagnosis, f->list);
+        mhi_diagnosis_judge(f->diagnosis, mhi_estimator_unmet(f->estimator), f->list);
         *weight = mhi_findings_weight(f->list);
     }
     return status;

@@ -3,6 +3,7 @@
 
 #include "base/arena.h"
 #include "base/clock.h"
+#include "base/values.h"
 #include "live/figure.h"
 #include "live/ring.h"
 
@@ -360,11 +361,6 @@ void mhi_outlets_stop(mhi_outlets *o) {
     free(o);
 }
 
-static int by_size(const void *a, const void *b) {
-    const double x = *(const double *)a, y = *(const double *)b;
-    return (x > y) - (x < y);
-}
-
 int32_t mhi_outlets_report(mhi_outlets *o, int32_t i, const char **id, int64_t *taken,
                            int64_t *lost, double latency[4]) {
     static const double fractions[4] = {0.5, 0.95, 0.99, 1};
@@ -383,7 +379,7 @@ int32_t mhi_outlets_report(mhi_outlets *o, int32_t i, const char **id, int64_t *
     }
     (void)pthread_mutex_unlock(&s->mutex);
     if (sorted != NULL) {
-        qsort(sorted, n, sizeof *sorted, by_size);
+        mhi_sort(sorted, (ptrdiff_t)n);
     }
     for (int32_t k = 0; k < 4; k++) {
         const size_t at = (size_t)(fractions[k] * (double)(n > 0 ? n - 1 : 0) + 0.5);

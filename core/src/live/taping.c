@@ -12,16 +12,18 @@
 typedef struct entry {
     int32_t source, stream, n_channels;
     uint32_t id;
-    int64_t n_taken;
+    double offset_told; /* s of the packet with which the clock's offset was written; -INFINITY */
 } entry;
+
+#define OFFSETS 5.0 /* s from one measured offset of a clock to the next, as recorders have it */
 
 struct mhi_taping {
     mhi_xdf_writer *writer;
     char *path;
     uint32_t arrivals, frames, grants, descriptions, maxima;
     int64_t n_arrivals;
-    int32_t n_entries;
-    entry entries[2 * MHI_FEED_INLETS];
+    int32_t n_entries, entries_room;
+    entry *entries; /* one a description: a sender that comes again and again has many */
     double *stamps; /* [room] of samples that have none */
     int32_t room;
     double last; /* s, of the packet taken last */
@@ -103,16 +105,28 @@ static entry *find(mhi_taping *r, const mhi_packet *p) {
     return NULL;
 }
 
+/* For one more; 0: no memory. */
+static int32_t make_room(mhi_taping *r) {
+    if (r->n_entries < r->entries_room) {
+        return 1;
+    }
+    const int32_t room = 2 * r->entries_room + 16;
+    entry *grown = realloc(r->entries, sizeof *grown * (size_t)room);
+    if (grown != NULL) {
+        r->entries = grown;
+        r->entries_room = room;
+    }
+    return grown != NULL;
+}
+
 /* Markers keep their axes as the community describes them. */
 static mhe_status add_stream(mhi_taping *r, const mhi_packet *p, mhe_error *err) {
     static const char *const types[] = {"", "MoCap", "EMG", "Angles"};
     static const char *const axes[] = {"PositionX", "PositionY", "PositionZ"};
     const mhi_stream *s = p->about;
-    if (r->n_entries == 2 * MHI_FEED_INLETS) {
-        return MHE_OK;
-    }
     mhi_xdf_column *columns = calloc((size_t)s->n_channels + 1, sizeof *columns);
-    if (columns == NULL) {
+    if (columns == NULL || !make_room(r)) {
+        free(columns);
         return mhe_fail(err, MHE_E_MEMORY, "out of memory");
     }
     for (int32_t i = 0; i < s->n_channels; i++) {
@@ -122,7 +136,7 @@ static mhe_status add_stream(mhi_taping *r, const mhi_packet *p, mhe_error *err)
         columns[i].type = s->kind == MHE_STREAM_MARKERS ? axes[i % 3] : NULL;
     }
     entry *e = &r->entries[r->n_entries++];
-    *e = (entry){p->source, p->stream, s->n_channels, 0, 0};
+    *e = (entry){p->source, p->stream, s->n_channels, 0, -INFINITY};
     mhe_status status = mhi_xdf_add_stream(r->writer, s->name, types[s->kind & 3], s->rate, columns,
                                            s->n_channels, NULL, &e->id, err);
     free(columns);
@@ -155,10 +169,11 @@ static mhe_status add_samples(mhi_taping *r, const mhi_packet *p, mhe_error *err
     const double row[MHI_ARRIVAL_COLUMNS] = {e->id, p->n, p->received, p->offset, stamps != NULL};
     mhe_status status = mhi_xdf_put(r->writer, e->id, p->n_channels, p->n,
                                     stamps == NULL ? r->stamps : stamps, p->values, err);
-    if (status == MHE_OK && stamps != NULL && isfinite(p->offset) && e->n_taken % 500 == 0) {
+    if (status == MHE_OK && stamps != NULL && isfinite(p->offset) &&
+        p->received - e->offset_told >= OFFSETS) {
         status = mhi_xdf_put_offset(r->writer, e->id, stamps[0], p->offset, err);
+        e->offset_told = p->received;
     }
-    e->n_taken += p->n;
     r->n_arrivals++;
     r->last = p->received;
     if (status == MHE_OK) {
@@ -205,6 +220,7 @@ mhe_status mhi_taping_close(mhi_taping *r, mhe_error *err) {
     }
     const mhe_status status = mhi_xdf_close(r->writer, err);
     free(r->stamps);
+    free(r->entries);
     free(r->path);
     free(r);
     return status;

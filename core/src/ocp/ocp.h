@@ -29,7 +29,7 @@ typedef struct mhi_ocp_setup {
     double interval;   /* s */
     int32_t n_workers; /* threads that may evaluate at the same time, >= 1 */
     /* For calibration; NULL and 0 else. What is estimated, and the system again, which they change;
-     * no term may then read forces, moments or the node before. Which interval of a junction
+     * no term may then read joint reactions or the node before. Which interval of a junction
      * (junction.h) each interval is [n_intervals], -1: of a motion. c_k of all nodes, as
      * samples of noise count; 0: as above. */
     const mhi_parameters_setup *parameters;

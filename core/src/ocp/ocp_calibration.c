@@ -27,8 +27,6 @@ static int32_t reads_before(const mhi_term *t) {
 
 mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe_error *err) {
     const uint32_t reactions = ((1u << MHI_MAX_REACTIONS) - 1) << MHI_SIGNAL_REACTION;
-    const uint32_t forces =
-        1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT | reactions;
     mhe_status status = MHE_OK;
     ocp->node_weight = setup->node_weight;
     if (setup->parameters == NULL && setup->junctions == NULL) {
@@ -52,11 +50,9 @@ mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe
         return status;
     }
     for (int32_t i = 0; i < ocp->n_terms; i++) {
-        const uint32_t reads = mhi_term_reads(&ocp->terms[i]);
-        if ((reads & forces) != 0 || ocp->terms[i].layout.jacobian != MHE_JACOBIAN_DIAGONAL) {
+        if ((mhi_term_reads(&ocp->terms[i]) & reactions) != 0) {
             return refuse(ocp, i,
-                          "muscle forces or several signals at once: calibration has no "
-                          "derivatives of that by parameters",
+                          "joint reactions: calibration has no derivatives of those by parameters",
                           err);
         }
     }
@@ -73,14 +69,16 @@ mhe_status mhi_ocp_set_calibration(mhi_ocp *ocp, const mhi_ocp_setup *setup, mhe
 mhe_status mhi_ocp_take_parameter_room(mhi_ocp *ocp, mhi_ocp_worker *w, mhe_error *err) {
     const int32_t n_p = ocp->face.n_p, n_z = ocp->n_x + ocp->face.n_u;
     w->P = MHI_TAKE(&ocp->arena, double, ocp->n_x *mhi_system_face(ocp->system)->n_p);
-    w->room = MHI_TAKE(&ocp->arena, double, mhi_parameters_room(ocp->system));
+    w->room = MHI_TAKE(&ocp->arena, double, mhi_parameters_room(ocp->system, n_p));
     w->by = MHI_TAKE(&ocp->arena, mhi_by_parameter, ocp->signals.n_y);
     w->by_p = (mhi_term_by_p){.by = w->by,
                               .n_p = n_p,
+                              .row = MHI_TAKE(&ocp->arena, double, n_p),
                               .gradient = MHI_TAKE(&ocp->arena, double, n_p),
                               .pz = MHI_TAKE(&ocp->arena, double, n_p *n_z),
                               .pp = MHI_TAKE(&ocp->arena, double, n_p *n_p)};
-    return !w->P || !w->room || !w->by || !w->by_p.gradient || !w->by_p.pz || !w->by_p.pp
+    return !w->P || !w->room || !w->by || !w->by_p.row || !w->by_p.gradient || !w->by_p.pz ||
+                   !w->by_p.pp
                ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                : MHE_OK;
 }

@@ -52,6 +52,8 @@ mhe_status mhi_parameters_create(const mhi_parameters_setup *setup, const mhi_sy
         s->moved[0] = moved->first;
         s->moved[1] = moved->first + moved->count;
     }
+    const mhe_block *masses = mhe_layout_find(f->layout, MHE_ROLE_PARAMETER, MHI_MASS);
+    s->of_bodies = masses != NULL ? masses->first : f->n_p;
     mhi_system_parameters(system, s->model);
     return MHE_OK;
 }
@@ -180,9 +182,11 @@ static void measure_marker(const double *offset, int32_t first, const double *bo
     }
 }
 
-int32_t mhi_parameters_room(const mhi_system *system) {
+/* Bodies, their derivatives, rows of joint moments. */
+int32_t mhi_parameters_room(const mhi_system *system, int32_t n) {
     const int32_t n_b = mhi_system_description(system)->n_bodies;
-    return n_b * 12 + n_b * 6 * mhi_system_face(system)->n_q;
+    const int32_t n_q = mhi_system_face(system)->n_q;
+    return n_b * 12 + n_b * 6 * n_q + n_q * n;
 }
 
 static mhe_status measure_markers(const mhi_parameters *s, const mhi_signal *markers,
@@ -210,9 +214,52 @@ static mhe_status measure_markers(const mhi_parameters *s, const mhi_signal *mar
     return status;
 }
 
+/* What one of the parameter's own changes the system's number by. */
+static double unit_of(const mhi_parameters *s, int32_t i) {
+    return is_moved(s, i) ? MHI_OFFSET_UNIT : s->model[i];
+}
+
+/* Forces by the numbers of their own muscles, joint moments by those of all. */
+static mhe_status measure_muscles(const mhi_parameters *s, const mhi_signals *signals,
+                                  const mhi_system *system, mhi_system_context *context,
+                                  uint32_t wanted, const double *x, const double *u, double *rows,
+                                  mhi_by_parameter *by, mhe_error *err) {
+    const mhe_system *f = mhi_system_face(system);
+    const mhi_signal *force = &signals->signal[MHI_SIGNAL_MUSCLE_FORCE];
+    const mhi_signal *moment = &signals->signal[MHI_SIGNAL_JOINT_MOMENT];
+    const int32_t n = s->setup.n, of_moments = (wanted >> MHI_SIGNAL_JOINT_MOMENT & 1) != 0;
+    mhi_muscle_state state;
+    mhe_system_point at;
+    mhi_system_point(system, x, u, NULL, &at);
+    const mhe_status status = mhi_system_muscles(context, &at, 1, &state, err);
+    for (int32_t i = 0; i < f->n_q && of_moments && status == MHE_OK; i++) {
+        memset(rows + i * n, 0, sizeof *rows * (size_t)n);
+        by[moment->offset + i].row = rows + i * n;
+    }
+    for (int32_t j = 0; j < s->of_bodies && status == MHE_OK; j++) {
+        const int32_t of = s->setup.of_system[j];
+        const int32_t m = is_moved(s, j) ? (j - s->moved[0]) / 3 : j % f->n_m;
+        const double unit = of < 0 ? 0 : unit_of(s, j);
+        if (wanted >> MHI_SIGNAL_MUSCLE_FORCE & 1) {
+            add_by(&by[force->offset + m], of, unit * state.force_p[j]);
+        }
+        for (int32_t i = 0; i < f->n_q && of_moments && of >= 0; i++) {
+            rows[i * n + of] += unit * state.moment_p[i * f->n_p + j];
+        }
+    }
+    return status;
+}
+
+/* 1: muscles' forces are among what is wanted, and have a value. */
+static int32_t reads_muscles(const mhi_signals *signals, uint32_t wanted, const double *u) {
+    const uint32_t forces = 1u << MHI_SIGNAL_MUSCLE_FORCE | 1u << MHI_SIGNAL_JOINT_MOMENT;
+    return (wanted & forces) != 0 &&
+           (u != NULL || !signals->signal[MHI_SIGNAL_MUSCLE_FORCE].reads_u);
+}
+
 mhe_status mhi_parameters_measure(const mhi_parameters *s, const mhi_signals *signals,
                                   const mhi_system *system, mhi_system_context *context,
-                                  uint32_t wanted, int32_t k, const double *x,
+                                  uint32_t wanted, int32_t k, const double *x, const double *u,
                                   const double *targets, double *room, double *y, double *jacobian,
                                   mhi_by_parameter *by, mhe_error *err) {
     for (int32_t i = 0; i < signals->n_y && by != NULL; i++) {
@@ -221,10 +268,15 @@ mhe_status mhi_parameters_measure(const mhi_parameters *s, const mhi_signals *si
     if (wanted >> s->control & 1) {
         measure_emg(s, &signals->signal[s->control], k, targets, y, by);
     }
-    return wanted >> MHI_SIGNAL_MARKERS & 1
+    mhe_status status = MHE_OK;
+    if (by != NULL && reads_muscles(signals, wanted, u)) {
+        double *rows = room + mhi_parameters_room(system, 0);
+        status = measure_muscles(s, signals, system, context, wanted, x, u, rows, by, err);
+    }
+    return status == MHE_OK && (wanted >> MHI_SIGNAL_MARKERS & 1) != 0
                ? measure_markers(s, &signals->signal[MHI_SIGNAL_MARKERS], system, context, x, room,
                                  y, jacobian, by, err)
-               : MHE_OK;
+               : status;
 }
 
 void mhi_parameters_fold(const mhi_parameters *s, int32_t n_x, int32_t n_p, const double *of_system,
@@ -235,8 +287,7 @@ void mhi_parameters_fold(const mhi_parameters *s, int32_t n_x, int32_t n_p, cons
         for (int32_t j = 0; j < n_p; j++) {
             const int32_t of = s->setup.of_system[j];
             if (of >= 0) {
-                P[i * n + of] +=
-                    of_system[i * n_p + j] * (is_moved(s, j) ? MHI_OFFSET_UNIT : s->model[j]);
+                P[i * n + of] += of_system[i * n_p + j] * unit_of(s, j);
             }
         }
     }

@@ -48,21 +48,23 @@ typedef struct mhi_parameters_setup {
 
 /* dy/dp of one entry of a signal; column: of the Jacobian that a diagonal signal has at its place.
  */
-#define MHI_MOST_BY_P 3
+#define MHI_MOST_BY_P 6 /* a muscle's force: three numbers of its own, and where it ends */
 typedef struct mhi_by_parameter {
     int32_t n, at[MHI_MOST_BY_P];
     double by[MHI_MOST_BY_P];
-    double slope; /* dy/dz of an entry that is z[column] where nothing is estimated */
+    const double *row; /* [n of the parameters] by all of them instead; NULL: the list says it */
+    double slope;      /* dy/dz of an entry that is z[column] where nothing is estimated */
 } mhi_by_parameter;
 
 typedef struct mhi_parameters {
     mhi_parameters_setup setup;
-    int32_t moved[2]; /* entries of the system's parameters that are offsets: from, to */
-    int32_t set;      /* the system has the numbers that p says */
-    int32_t control;  /* the signal that the muscles' controls are */
-    double *p;        /* [n] now */
-    double *model;    /* [n_p of the system] the model's own numbers */
-    double *system;   /* scratch of the same size */
+    int32_t moved[2];  /* entries of the system's parameters that are offsets: from, to */
+    int32_t of_bodies; /* entries of the system's parameters from here on are no muscles' */
+    int32_t set;       /* the system has the numbers that p says */
+    int32_t control;   /* the signal that the muscles' controls are */
+    double *p;         /* [n] now */
+    double *model;     /* [n_p of the system] the model's own numbers */
+    double *system;    /* scratch of the same size */
     double *lower, *upper;
 } mhi_parameters;
 
@@ -75,13 +77,14 @@ mhe_status mhi_parameters_set(mhi_parameters *parameters, mhi_system *system, co
 /* The signals `wanted` of node k in y as they are measured (EMG whose target of `targets` [n_y],
  * may be NULL, is missing stays the control itself: its gain says nothing), and `by` [n_y] of them
  * (NULL: not wanted); jacobian as of mhi_signals_evaluate, changed where markers' offsets turn with
- * their bodies. `body` [n_b x 12] and `body_q` are room. [hot] */
+ * their bodies. [hot] */
 mhe_status mhi_parameters_measure(const mhi_parameters *parameters, const mhi_signals *signals,
                                   const mhi_system *system, mhi_system_context *context,
-                                  uint32_t wanted, int32_t k, const double *x,
+                                  uint32_t wanted, int32_t k, const double *x, const double *u,
                                   const double *targets, double *room, double *y, double *jacobian,
                                   mhi_by_parameter *by, mhe_error *err);
-int32_t mhi_parameters_room(const mhi_system *system); /* doubles */
+/* Doubles of room, where `n` parameters are estimated. */
+int32_t mhi_parameters_room(const mhi_system *system, int32_t n);
 /* dF/dp [n_x x n] out of that by the system's parameters [n_x x n_p]. [hot] */
 void mhi_parameters_fold(const mhi_parameters *parameters, int32_t n_x, int32_t n_p,
                          const double *of_system, double *P);

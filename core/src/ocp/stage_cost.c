@@ -149,7 +149,7 @@ mhe_status mhi_ocp_cost(const mhi_ocp *ocp, mhi_ocp_worker *w, int32_t k, const 
     mhi_term_sum sum = {0};
     if (ocp->estimated != NULL) {
         status = mhi_parameters_measure(
-            &ocp->parameters, &ocp->signals, ocp->system, w->system, ocp->wanted, k, x,
+            &ocp->parameters, &ocp->signals, ocp->system, w->system, ocp->wanted, k, x, u,
             ocp->targets + (ptrdiff_t)k * ocp->signals.n_y, w->room, w->y,
             derivatives ? w->jacobian : NULL, derivatives ? w->by : NULL, err);
         if (status != MHE_OK) {

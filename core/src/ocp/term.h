@@ -57,6 +57,7 @@ typedef struct mhi_term_workspace {
 typedef struct mhi_term_by_p {
     const mhi_by_parameter *by;
     int32_t n_p;
+    double *row;      /* [n_p] scratch */
     double *gradient; /* [n_p] */
     double *pz;       /* [n_p x n_z] */
     double *pp;       /* [n_p x n_p], lower triangle */

@@ -23,10 +23,32 @@ static void add_row(const double *row, int32_t first, int32_t n, double r, doubl
     }
 }
 
-/* A residual's share in what concerns parameters: d of its entry's dy/dp, `row` [n] from column
- * `first` on of its dy/dz. */
+/* A residual's share in what concerns parameters: `by` [n_p] of its dr/dp, `row` [n] from column
+ * `first` on of its dr/dz. */
+static void add_row_by_p(const double *by, double r, double scale, const double *row, int32_t first,
+                         int32_t n, int32_t n_z, mhi_term_by_p *sum) {
+    for (int32_t a = 0; a < sum->n_p; a++) {
+        const double of_p = scale * by[a];
+        if (of_p == 0) {
+            continue;
+        }
+        sum->gradient[a] += of_p * r;
+        for (int32_t b = 0; b <= a; b++) {
+            sum->pp[a * sum->n_p + b] += of_p * by[b];
+        }
+        for (int32_t c = 0; c < n; c++) {
+            sum->pz[a * n_z + first + c] += of_p * row[c];
+        }
+    }
+}
+
+/* The same with d of its entry's dy/dp and dy/dz. */
 static void add_by_p(const mhi_by_parameter *by, double d, double r, double scale,
                      const double *row, int32_t first, int32_t n, int32_t n_z, mhi_term_by_p *sum) {
+    if (by->row != NULL) {
+        add_row_by_p(by->row, r / d, scale * d * d, row, first, n, n_z, sum);
+        return;
+    }
     for (int32_t a = 0; a < by->n; a++) {
         const double of_p = scale * d * by->by[a];
         sum->gradient[by->at[a]] += of_p * r;
@@ -38,6 +60,16 @@ static void add_by_p(const mhi_by_parameter *by, double d, double r, double scal
         for (int32_t c = 0; c < n; c++) {
             sum->pz[by->at[a] * n_z + first + c] += of_p * d * row[c];
         }
+    }
+}
+
+/* d of an entry's dy/dp into the row of a residual of several. */
+static void gather_by_p(const mhi_by_parameter *by, double d, mhi_term_by_p *sum) {
+    for (int32_t a = 0; a < sum->n_p && by->row != NULL; a++) {
+        sum->row[a] += d * by->row[a];
+    }
+    for (int32_t a = 0; a < by->n && by->row == NULL; a++) {
+        sum->row[by->at[a]] += d * by->by[a];
     }
 }
 
@@ -115,24 +147,36 @@ void mhi_term_sum_dense(const mhi_term *t, mhi_term_workspace *w, const mhi_sign
         }
         int32_t first = n_z, end = 0;
         memset(w->row, 0, sizeof(double) * (size_t)n_z);
+        if (sum->by_p != NULL) {
+            memset(sum->by_p->row, 0, sizeof(double) * (size_t)sum->by_p->n_p);
+        }
         for (int32_t j = 0; j < t->ny; j++) {
             const mhi_signal *s = &signals->signal[t->y_signal[j]];
             const double d = w->jacobian[i * t->ny + j] * s->scale;
+            const mhi_by_parameter *by = sum->by_p == NULL ? NULL : &sum->by_p->by[t->y_index[j]];
+            const double to_z = by == NULL || s->n_columns > 0 ? d : d * by->slope;
             if (d == 0) {
                 continue;
+            }
+            if (by != NULL) {
+                gather_by_p(by, d, sum->by_p);
             }
             const int32_t row = t->y_index[j] - s->offset;
             const int32_t from = s->n_columns == 0 ? s->column + row : s->column;
             const int32_t to = s->n_columns == 0 ? from + 1 : from + s->n_columns;
             const double *block = jacobian + s->jacobian + row * s->n_columns;
             for (int32_t c = from; c < to; c++) {
-                w->row[c] += s->n_columns == 0 ? d : d * block[c - from];
+                w->row[c] += s->n_columns == 0 ? to_z : d * block[c - from];
             }
             first = from < first ? from : first;
             end = to > end ? to : end;
         }
         if (first < end) {
             add_row(w->row + first, first, end - first, w->r[i], scale, n_z, sum);
+            if (sum->by_p != NULL) {
+                add_row_by_p(sum->by_p->row, w->r[i], scale, w->row + first, first, end - first,
+                             n_z, sum->by_p);
+            }
         }
     }
 }

@@ -139,7 +139,7 @@ INLINED void geodesic_rate(int torus, const double *w, const lanes *y, lanes *ra
  * smoothing; ends [STATES x LANES]. */
 INLINED void midpoint_step(int torus, const double *w, const double *y, double h, int block,
                            lanes *ends) {
-    lanes last[STATES], at[STATES], rate[STATES], sub;
+    lanes last[STATES] = {{0}}, at[STATES], rate[STATES], sub;
     for (int l = 0; l < LANES; l++) {
         sub[l] = h / (2 * (l + 1 + block * LANES));
     }
