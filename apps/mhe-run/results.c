@@ -332,7 +332,9 @@ mhe_status results_write(results *r, const mhe_estimate *e, const double *distan
         status = write_uncertainty(r, e, err);
     }
     if (status == MHE_OK) {
-        const double quality[] = {e->status,           e->iterations, e->kkt_residual,
+        /* Of a solve that broke off it is infinite, which few readers of tables take. */
+        const double residual = isfinite(e->kkt_residual) ? e->kkt_residual : NAN;
+        const double quality[] = {e->status,           e->iterations, residual,
                                   1e3 * e->solve_time, e->marker_rms, e->emg_rms};
         status = write_row(&r->quality, e->time, quality, err);
     }

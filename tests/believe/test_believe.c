@@ -217,6 +217,89 @@ static void markers_that_hold_or_are_gone(void **state) {
     free_rig(r);
 }
 
+static void gaps_that_hide_themselves(void **state) {
+    (void)state;
+    const int width = 3 * MARKERS;
+    rig *r = new_rig();
+    for (int k = 60; k < 100; k++) { /* a line drawn over a gap, rounded as files round */
+        for (int i = 0; i < 3; i++) {
+            const double from = r->markers[59 * width + i], to = r->markers[100 * width + i];
+            r->markers[k * width + i] = 1e-6 * round(1e6 * (from + (to - from) * (k - 59) / 41));
+        }
+    }
+    mhi_believe_markers(&r->run, &believe_model, &r->recording, &r->findings);
+    expect(r, MHI_FINDING_DOUBTFUL, "along a straight line at one speed: K (20 %");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+    for (int begin = 0; begin <= 100; begin += 50) {
+        r = new_rig();
+        for (int k = begin; k < begin + 35; k++) { /* less than a fifth, but at once */
+            for (int i = 0; i < width; i++) {
+                r->markers[k * width + i] = NAN;
+            }
+        }
+        mhi_believe_markers(&r->run, &believe_model, &r->recording, &r->findings);
+        expect(r, MHI_FINDING_DOUBTFUL,
+               begin == 0    ? "no marker from 0 to 0.34 s"
+               : begin == 50 ? "no marker from 0.5 to 0.84 s"
+                             : "no marker from 1 to 1.34 s");
+        assert_int_equal(r->findings.n, 1);
+        assert_int_equal(strstr(mhi_finding_remedy(&r->findings.all[0]), "where the body began") !=
+                             NULL,
+                         begin == 0);
+        free_rig(r);
+    }
+}
+
+static void emg_of_an_amplifier_alone(void **state) {
+    (void)state;
+    static mhi_emg_channel channels[] = {{.name = "E1"}, {.name = "E2"}};
+    rig *r = new_rig();
+    for (int k = 0; k < FRAMES; k++) {
+        r->emg[k * MUSCLES + 1] = 0.002 * k + 0.01 * (k % 3); /* drifts */
+    }
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "nothing but a straight line: B (by 0.4");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+    r = new_rig(); /* one sample of a cable, cut to emg.max in what is followed */
+    r->run.emg.channels = channels;
+    r->run.emg.n_channels = 2;
+    r->recording.emg_report = (mhi_emg_report){.n_channels = 2, .peak = 18.6, .peak_channel = 1};
+    assert_int_equal(check_emg(r), MHE_OK);
+    expect(r, MHI_FINDING_DOUBTFUL, "channel 'E2' reaches 1.86e+03 % of its MVC");
+    assert_int_equal(r->findings.n, 1);
+    free_rig(r);
+}
+
+static void emg_of_another_model(void **state) {
+    (void)state;
+    mhe_description larger = believe_model;
+    for (int32_t found = 1; found <= 2; found++) {
+        rig *r = new_rig();
+        mhe_muscle muscles[5] = {
+            {.name = "A"}, {.name = "B"}, {.name = "C"}, {.name = "D"}, {.name = "E"}};
+        double emg[FRAMES * 5];
+        for (int k = 0; k < FRAMES; k++) {
+            for (int i = 0; i < 5; i++) {
+                emg[5 * k + i] = i < found ? r->emg[k * MUSCLES + i] : NAN;
+            }
+        }
+        larger.n_muscles = 5;
+        larger.muscles = muscles;
+        r->recording.emg = emg;
+        r->recording.n_emg_found = found;
+        r->recording.n_emg_columns = 6;
+        assert_int_equal(mhi_believe_emg(&r->run, &larger, &r->recording, &r->findings, &r->err),
+                         MHE_OK);
+        assert_int_equal(r->findings.n, found == 1);
+        if (found == 1) {
+            expect(r, MHI_FINDING_DOUBTFUL, "of 6 columns 1 are muscles of the model, which has 5");
+        }
+        free_rig(r);
+    }
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(sound_data_give_no_finding),
@@ -228,6 +311,9 @@ int main(void) {
         cmocka_unit_test(angles_against_their_ranges),
         cmocka_unit_test(markers_that_hold_or_are_gone),
         cmocka_unit_test(markers_that_jump_together),
+        cmocka_unit_test(gaps_that_hide_themselves),
+        cmocka_unit_test(emg_of_an_amplifier_alone),
+        cmocka_unit_test(emg_of_another_model),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

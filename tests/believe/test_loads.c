@@ -156,9 +156,78 @@ static void loads_against_gravity_weight_and_markers(void **state) {
     free_rig(r);
 }
 
+/* The foot's markers are where the forces act; the file gives them to the leg. */
+static void loads_on_the_wrong_body(void **state) {
+    static mhe_body bodies[] = {{.name = "leg", .parent = -1, .mass = 80},
+                                {.name = "foot", .parent = 0}};
+    mhe_marker markers[MARKERS];
+    mhe_description person = believe_model;
+    char folder[256], path[300];
+    (void)state;
+    assert_non_null(test_folder(folder, sizeof folder));
+    write_loads(folder, NULL);
+    (void)snprintf(path, sizeof path, "%s/l.xml", folder);
+    person.coordinates = pelvis;
+    person.n_bodies = 2;
+    person.bodies = bodies;
+    person.gravity[1] = -9.81;
+    memcpy(markers, believe_model.markers, sizeof markers);
+    person.markers = markers;
+    for (int wrong = 0; wrong < 2; wrong++) {
+        markers[0].body = markers[1].body = wrong;
+        markers[2].body = !wrong;
+        rig *r = new_rig();
+        r->run.data.external_loads = path;
+        assert_int_equal(mhi_believe_loads(&r->run, &person, &r->recording, &r->findings, &r->err),
+                         MHE_OK);
+        assert_int_equal(r->findings.n, 2 * wrong); /* of two feet */
+        if (wrong) {
+            expect(r, MHI_FINDING_DOUBTFUL, "'foot1' is applied to leg, but acts");
+        }
+        free_rig(r);
+    }
+}
+
+/* Two seconds of loads that seem to be half an hour. */
+static void loads_in_milliseconds_are_named(void **state) {
+    char folder[256], path[300];
+    (void)state;
+    assert_non_null(test_folder(folder, sizeof folder));
+    (void)snprintf(path, sizeof path, "%s/l.sto", folder);
+    static mhe_body leg = {.name = "leg", .parent = -1, .mass = 80};
+    mhe_description person = believe_model;
+    person.coordinates = pelvis;
+    person.bodies = &leg;
+    person.gravity[1] = -9.81;
+    rig *r = new_rig();
+    write_loads(folder, NULL); /* its xml */
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    (void)fputs("l\nversion=1\nendheader\ntime", file);
+    for (int i = 0; i < 18; i++) {
+        (void)fprintf(file, "\t%c%d%c", "fpt"[i % 9 / 3], i / 9, "xyz"[i % 3]);
+    }
+    for (int k = 0; k < FRAMES; k++) {
+        (void)fprintf(file, "\n%d", 1000 * k);
+        for (int i = 0; i < 18; i++) {
+            (void)fputs(i % 9 == 1 ? "\t400" : "\t0", file);
+        }
+    }
+    (void)fputs("\n", file);
+    (void)fclose(file);
+    (void)snprintf(path, sizeof path, "%s/l.xml", folder);
+    r->run.data.external_loads = path;
+    assert_int_equal(mhi_believe_loads(&r->run, &person, &r->recording, &r->findings, &r->err),
+                     MHE_OK);
+    expect(r, MHI_FINDING_USELESS, "rows are 1000 s apart");
+    free_rig(r);
+}
+
 int main(void) {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(loads_against_gravity_weight_and_markers),
+        cmocka_unit_test(loads_on_the_wrong_body),
+        cmocka_unit_test(loads_in_milliseconds_are_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -262,6 +262,15 @@ trc 100 'if (k < 15) {} else {t += 0.12; q = 0.5 + 0.3 * sin(1.6 * pi * t); time
     for (i = 0; i < 3; i++) {c[3 * i + 1] = cos(q) * p[3 * i + 1] - sin(q) * p[3 * i + 2]
         c[3 * i + 2] = sin(q) * p[3 * i + 1] + cos(q) * p[3 * i + 2]}}' > pause.trc
 read_right pause 0.01 '0.12 s without frames after 0.14 s: begins again there'
+config jitter hinge.bioMod 'markers: jitter.trc'
+trc 100 'time = sprintf("%.6f", t + 0.003 * sin(37 * k * k))' > jitter.trc
+read_right jitter 0.005 'ms about an even 100 Hz, on which they are put'
+config stamped hinge.bioMod 'angles: stamped.mot' 'q, sigma: 0.005' # no rate in its header
+mot 'version=1' 1 'time = sprintf("%.6f", t + 0.003 * sin(37 * k * k))' > stamped.mot
+read_right stamped 0.005 'Hz, on which they are put'
+config counted hinge.bioMod 'markers: counted.trc'
+trc 100 'time = frame' > counted.trc
+read_right counted 0.005 "the times are the frames' numbers"
 config unit hinge.bioMod 'markers: unit.trc'
 trc 100 '' '' 'Millimeters' > unit.trc
 read_right unit 0.005
@@ -275,7 +284,18 @@ datacolumns 2
 datarows 40' $deg > simm.mot
 read_right simm 0.005 'angles are taken as degrees'
 
+# What a download left in a file's place.
+config pointer hinge.bioMod 'markers: pointer.trc'
+printf 'version https://git-lfs.github.com/spec/v1\noid sha256:12\nsize 3730\n' > pointer.trc
+refused pointer 'pointer.trc:1: a pointer of Git LFS'
+config web web.bioMod 'markers: good.trc'
+printf '\n<!DOCTYPE html>\n<html><body>Not found</body></html>\n' > web.bioMod
+refused web 'web.bioMod:1: a web page'
+
 # Models.
+config light light.bioMod 'markers: good.trc'
+sed 's/-9.81/-1/' hinge.bioMod > light.bioMod
+read_right light 0.005 'gravity is 1 m/s2; is it in parts of 9.81 m/s2?'
 config upper upper.bioMod 'markers: good.trc'
 sed 's/^\(segment\|marker\|end.*\|  parent\|  rotations\)/\U\1/' hinge.bioMod > upper.bioMod
 read_right upper 0.005

@@ -23,6 +23,9 @@
 #define REST_SHARE 0.05 /* of the samples; people rest each muscle for longer in a recording */
 #define REST_TIME 1.0   /* s: in a shorter recording they may not */
 #define REST_CHANNELS 3 /* of so many and more one rests at times */
+#define LINE 0.97       /* share of the squares that one straight line explains */
+#define RISE 0.05       /* of the MVC along it: less moves no force */
+#define FEW 4           /* times as many columns, and muscles, are without the other */
 #define MANY 6          /* of so many and more one rests nearly always; else ... */
 #define TENSE 0.25      /* ... in that share of the frames all have something in common */
 
@@ -128,6 +131,58 @@ static void check_rest(const char *path, const mhe_description *d, const mhi_rec
                          "%s: all of %d muscles are active at once (above %.0f %% of the MVC) in "
                          "%.0f %% of the frames",
                          path, n_there, 100 * REST, 100 * tense);
+    }
+}
+
+/* What a straight line through the channel rises by from the first frame to the last, where the
+ * line is all that there is; else 0. Muscles that are tensed slowly tremble about their line. */
+static double rises(const mhi_recording *r, int32_t n_m, int32_t muscle) {
+    double n = 0, t = 0, y = 0, tt = 0, ty = 0, yy = 0;
+    for (int32_t k = 0; k < r->n_frames; k++) {
+        const double value = r->emg[(ptrdiff_t)k * n_m + muscle], x = k;
+        if (!isnan(value)) {
+            n++;
+            t += x;
+            y += value;
+            tt += x * x;
+            ty += x * value;
+            yy += value * value;
+        }
+    }
+    const double xx = tt - t * t / n, xy = ty - t * y / n, all = yy - y * y / n;
+    return n >= REST_TIME * r->rate && xx > 0 && xy * xy > LINE * xx * all ? xy / xx * r->n_frames
+                                                                           : 0;
+}
+
+/* An amplifier that drifts, an electrode that dries. */
+static void check_drift(const char *path, const mhe_description *d, const mhi_recording *r,
+                        mhi_findings *findings) {
+    mhi_text drift = {0};
+    for (int32_t i = 0; i < d->n_muscles; i++) {
+        const double by = rises(r, d->n_muscles, i);
+        if (fabs(by) > RISE) {
+            mhi_text_add(&drift, "%s%s (by %.2f)", drift.length == 0 ? "" : ", ",
+                         d->muscles[i].name, by);
+        }
+    }
+    if (drift.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an amplifier's drift? High-pass raw EMG before its envelope is made",
+                         "%s: nothing but a straight line: %s", path, drift.data);
+    }
+    mhi_text_free(&drift);
+}
+
+/* The envelope is cut to emg.max: what was above stands in no frame. */
+static void check_peak(const char *path, const mhi_run *run, const mhi_recording *r,
+                       mhi_findings *findings) {
+    const mhi_emg_report *e = &r->emg_report;
+    if (e->n_channels > 0 && e->peak > BEYOND) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "an artefact (a cable, a single sample), or a wrong MVC? It is cut to "
+                         "emg.max and believed there",
+                         "%s: channel '%s' reaches %.3g %% of its MVC", path,
+                         run->emg.channels[e->peak_channel].name, 100 * e->peak);
     }
 }
 
@@ -257,6 +312,18 @@ static void check_overlap(const char *path, const mhi_recording *r, int32_t n_m,
     }
 }
 
+/* A name or two that two models share; files with other signals hold more of this one's. */
+static void check_names(const char *path, const mhi_recording *r, int32_t n_m,
+                        mhi_findings *findings) {
+    const int32_t found = r->n_emg_found;
+    if (found > 0 && FEW * found < r->n_emg_columns && FEW * found < n_m) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "EMG of another model? data.labels, or emg.channels, say which is which",
+                         "%s: of %d columns %d are muscles of the model, which has %d", path,
+                         (int)r->n_emg_columns, (int)found, (int)n_m);
+    }
+}
+
 /* Which costs want EMG is known of those that say so in their id. */
 static int32_t wants_emg(const mhi_run *run) {
     for (int32_t i = 0; i < run->n_costs; i++) {
@@ -303,7 +370,10 @@ mhe_status mhi_believe_emg(const mhi_run *run, const mhe_description *d, const m
     }
     if (status == MHE_OK) {
         check_channels(path, d, r, all, findings);
+        check_drift(path, d, r, findings);
+        check_peak(path, run, r, findings);
         check_rest(path, d, r, all, findings);
+        check_names(path, r, d->n_muscles, findings);
         check_overlap(path, r, d->n_muscles, findings);
     }
     free(all);

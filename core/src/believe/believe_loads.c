@@ -17,6 +17,10 @@
 #define MOST 4.0       /* of the weight, the largest */
 #define FAR 0.5        /* m, of a point beside all markers of its time */
 #define FAR_SHARE 0.05 /* of the samples with a force */
+#define NEARER 0.15    /* m by which another body's markers are nearer ... */
+#define MOSTLY 0.5     /* ... in that share of the samples */
+#define SLOWEST 0.5    /* s between rows: nobody walks so slowly */
+#define MANY_ROWS 20   /* a weight that is held may have few */
 #define LEVER 20.0     /* N m, of a small force with such a point */
 #define UNLOADED 0.15  /* share of the largest force below which a plate may be unloaded */
 #define REST_SHARE 0.1 /* of the samples: so long a plate must be unloaded to judge its zero */
@@ -147,6 +151,53 @@ static void check_points(const view *v, int32_t l) {
     }
 }
 
+/* Distance of a point from the nearest marker of a frame that is the body's (or, not `own`, of
+ * another one, which is given); infinite without any. */
+static double nearest(const view *v, int32_t frame, const double *point, int32_t body, int own,
+                      int32_t *of) {
+    double least = INFINITY;
+    for (int32_t i = 0; i < v->d->n_markers; i++) {
+        const double *p = v->r->markers + 3 * ((ptrdiff_t)frame * v->d->n_markers + i);
+        const double to[3] = {p[0] - point[0], p[1] - point[1], p[2] - point[2]};
+        if ((v->d->markers[i].body == body) == own && length(to) < least) { /* not of NaN */
+            least = length(to);
+            *of = v->d->markers[i].body;
+        }
+    }
+    return least;
+}
+
+/* A force at one body's markers that the file gives to another body: the other foot, the pelvis. */
+static void check_body(const view *v, int32_t l) {
+    const int32_t body = v->loads->loads[l].body;
+    double force[3], point[3], away = 0, near = 0;
+    int32_t n = 0, n_other = 0, other = -1;
+    for (int32_t k = 0; k < v->loads->n_rows && v->r->markers != NULL; k++) {
+        const int32_t frame = frame_at(v->r, v->loads->time[k]);
+        if (frame < 0 || !take(v, k, l, force, point) || length(force) < MUCH) {
+            continue;
+        }
+        int32_t of = -1;
+        const double own = nearest(v, frame, point, body, 1, &of);
+        const double beside_it = nearest(v, frame, point, body, 0, &of);
+        n += isfinite(own);
+        if (isfinite(own) && own - beside_it > NEARER) {
+            n_other++;
+            other = own > away ? of : other;
+            near = own > away ? beside_it : near;
+            away = fmax(away, own);
+        }
+    }
+    if (n_other > MOSTLY * n && other >= 0 && body >= 0) {
+        mhi_findings_add(v->findings, MHI_FINDING_DOUBTFUL,
+                         "is applied_to_body the one that stands there?",
+                         "%s: '%s' is applied to %s, but acts %.2g m from its markers and %.2g m "
+                         "from those of %s (%.0f %% of the samples)",
+                         v->run->data.external_loads, v->loads->names[l], v->d->bodies[body].name,
+                         away, near, v->d->bodies[other].name, 100.0 * n_other / n);
+    }
+}
+
 /* A small force whose point runs away is a moment that nobody exerted. */
 static void check_levers(const view *v, int32_t l) {
     double force[3], point[3], largest = 0, size = 0, away = 0, when = 0;
@@ -210,6 +261,17 @@ static void check_zero(const view *v, int32_t l) {
     }
 }
 
+/* Feet that step over half an hour. */
+static void check_times(const view *v) {
+    const int32_t n = v->loads->n_rows;
+    const double step = n > MANY_ROWS ? (v->loads->time[n - 1] - v->loads->time[0]) / (n - 1) : 0;
+    if (step > SLOWEST) {
+        mhi_findings_add(v->findings, MHI_FINDING_USELESS,
+                         "are its times in ms instead of s? Divide them by 1000",
+                         "%s: the loads' rows are %.4g s apart", v->run->data.external_loads, step);
+    }
+}
+
 /* Whether the model's own weight is to be carried: it can move along two axes at least. */
 static int32_t is_free(const mhe_description *d) {
     int32_t n = 0;
@@ -235,9 +297,14 @@ mhe_status mhi_believe_loads(const mhi_run *run, const mhe_description *d, const
         v.up[i] = -d->gravity[i] / g;
     }
     if (status == MHE_OK && g > 0 && v.weight > MUCH && is_free(d)) { /* a person, not a limb */
+        check_times(&v);
         check_direction(&v);
         for (int32_t l = 0; l < v.loads->n_loads; l++) {
+            const int32_t told = findings->n;
             check_points(&v, l);
+            if (findings->n == told) {
+                check_body(&v, l);
+            }
             check_zero(&v, l);
         }
         for (int32_t l = 0; l < v.loads->n_loads && findings->n == before; l++) {

@@ -11,6 +11,10 @@
 #define STILL_SHARE 0.01  /* of the frames */
 #define STEPS_SHARE 0.2   /* of the frames */
 #define MISSING_SHARE 0.2 /* of the frames without any marker */
+#define ALONE 0.3         /* s without any marker: with EMG a quarter off, 1 to 2 degrees (docs) */
+#define STRAIGHT 0.2      /* s along a straight line: nobody moves so ... */
+#define BENT 2e-3         /* ... to this share of the way from frame to frame ... */
+#define PASSED 0.005      /* m: ... over more than this */
 #define MOVES 1e-4        /* m: a recording in which nothing moves more shows no motion */
 #define JUMP 0.01         /* m of most markers together between two frames, beyond ... */
 #define FASTEST 50.0      /* ... what so large a change of velocity (m/s2) makes of it ... */
@@ -74,6 +78,52 @@ static void check_still(const char *path, const mhe_description *d, const mhi_re
                          "%s: positions repeat to the last digit: %s", path, still.data);
     }
     mhi_text_free(&still);
+}
+
+/* Frames in which a marker goes on along a straight line at one speed, in runs of STRAIGHT. */
+static int32_t count_straight(const mhi_recording *r, int32_t n_k, int32_t marker) {
+    const ptrdiff_t width = 3 * (ptrdiff_t)n_k;
+    int32_t n = 0, run = 0;
+    double passed = 0;
+    for (int32_t k = 2; k < r->n_frames; k++) {
+        const double *p = r->markers + k * width + 3 * (ptrdiff_t)marker;
+        double bend = 0, way = 0;
+        for (int32_t i = 0; i < 3; i++) {
+            const double to = p[i] - p[i - width], from = p[i - width] - p[i - 2 * width];
+            bend += (to - from) * (to - from);
+            way += to * to;
+        }
+        const int32_t goes_on = bend < BENT * BENT * way;
+        passed = goes_on ? passed + sqrt(way) : 0;
+        run = goes_on ? run + 1 : 0;
+        const int32_t least = (int32_t)fmax(5, STRAIGHT * r->rate);
+        if (run >= least && passed > PASSED) {
+            n += n == 0 || run == least ? run : 1;
+        }
+    }
+    return n;
+}
+
+/* Gaps that a straight line was drawn over: the line is believed like what was seen. */
+static void check_straight(const char *path, const mhe_description *d, const mhi_recording *r,
+                           mhi_findings *findings) {
+    mhi_text straight = {0};
+    for (int32_t i = 0; i < d->n_markers; i++) {
+        const int32_t n = count_straight(r, d->n_markers, i);
+        if (n > STILL_SHARE * r->n_frames) {
+            mhi_text_add(&straight, "%s%s (%.0f %% of the frames)",
+                         straight.length == 0 ? "" : ", ", d->markers[i].name,
+                         100.0 * n / r->n_frames);
+        }
+    }
+    if (straight.length > 0) {
+        mhi_findings_add(findings, MHI_FINDING_DOUBTFUL,
+                         "gaps that were filled by a line? Leave those samples empty: the model "
+                         "bridges them better",
+                         "%s: positions go along a straight line at one speed: %s", path,
+                         straight.data);
+    }
+    mhi_text_free(&straight);
 }
 
 /* Frames in which every marker repeats the one before, which was no repetition itself. */
@@ -165,13 +215,16 @@ void mhi_believe_markers(const mhi_run *run, const mhe_description *d, const mhi
     if (r->markers == NULL || path == NULL) {
         return;
     }
-    int32_t n_empty = 0;
+    int32_t n_empty = 0, alone = 0, longest = 0, end = 0;
     for (int32_t k = 0; k < r->n_frames; k++) {
         int32_t seen = 0;
         for (int32_t i = 0; i < d->n_markers && !seen; i++) {
             seen = !isnan(r->markers[3 * ((ptrdiff_t)k * d->n_markers + i)]);
         }
         n_empty += !seen;
+        alone = seen ? 0 : alone + 1;
+        end = alone > longest ? k : end;
+        longest = alone > longest ? alone : longest;
     }
     if (n_empty == r->n_frames) {
         mhi_findings_add(findings, MHI_FINDING_USELESS, "nothing shows where the body is",
@@ -180,8 +233,15 @@ void mhi_believe_markers(const mhi_run *run, const mhe_description *d, const mhi
         mhi_findings_add(
             findings, MHI_FINDING_DOUBTFUL, "what is estimated there is the model's prediction",
             "%s: %.0f %% of the frames have no marker", path, 100.0 * n_empty / r->n_frames);
+    } else if (longest > ALONE * r->rate) {
+        mhi_findings_add(
+            findings, MHI_FINDING_DOUBTFUL,
+            end + 1 == longest ? "nothing shows where the body began: cut these frames off"
+                               : "what is estimated there is the model's prediction",
+            "%s: no marker from %.4g to %.4g s", path, r->time[end + 1 - longest], r->time[end]);
     }
     check_still(path, d, r, findings);
+    check_straight(path, d, r, findings);
     check_steps(path, d, r, findings);
     check_jump(path, d, r, findings);
 }

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "base/pi.h"
 #include "base/text.h"
 #include "believe/believe.h"
 #include "believe/pose.h"
@@ -12,6 +13,7 @@
 #define IMPOSSIBLE 1e6  /* N */
 #define LONGEST 2.0     /* optimal lengths of a fibre: beyond it tears */
 #define SHORTEST 0.3    /* below it no filaments overlap */
+#define STEEPEST 1.05   /* rad, 60 degrees: people's muscles reach 30 */
 #define COINCIDE 1e-6   /* m */
 #define ARM_SHARE 0.1   /* of the body's mass: an arm is 5 % (de Leva 1996, 29, 1223-1230) */
 #define WHOLE_BODY 20.0 /* kg: a model with a trunk */
@@ -70,7 +72,8 @@ static int32_t all_at_one_place(const mhe_path *m) {
 }
 
 static void check_muscles(const mhe_description *d, mhi_findings *findings) {
-    list strong = {{0}, 0}, impossible = {{0}, 0}, slack = {{0}, 0}, points = {{0}, 0};
+    list strong = {{0}, 0}, impossible = {{0}, 0}, slack = {{0}, 0}, points = {{0}, 0},
+         steep = {{0}, 0};
     for (int32_t i = 0; i < d->n_muscles; i++) {
         const mhe_muscle *m = &d->muscles[i];
         if (m->max_isometric_force > STRONGEST) {
@@ -79,6 +82,10 @@ static void check_muscles(const mhe_description *d, mhi_findings *findings) {
         }
         if (m->tendon_slack_length == 0) {
             add(&slack, "%s", m->name);
+        }
+        if (m->pennation_angle > STEEPEST) {
+            add(&steep, "%s (line %d: %.0f degrees)", m->name, (int)m->line,
+                m->pennation_angle * 180 / MHI_PI);
         }
         const mhe_path *path = &d->paths[i];
         if (path->n_points > 1 && (has_no_length(path) || all_at_one_place(path))) {
@@ -91,6 +98,8 @@ static void check_muscles(const mhe_description *d, mhi_findings *findings) {
          "muscles stronger than any person's", findings);
     tell(&slack, d, MHI_FINDING_NOTE, "right only where there is no tendon",
          "muscles with tendon slack length 0", findings);
+    tell(&steep, d, MHI_FINDING_DOUBTFUL, "correct pennation_angle_at_optimal (rad)",
+         "fibres that stand across their tendon", findings);
     tell(&points, d, MHI_FINDING_DOUBTFUL, "correct the path points",
          "muscles whose path points coincide", findings);
 }

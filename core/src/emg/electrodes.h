@@ -77,6 +77,8 @@ typedef struct mhi_emg_report {
     int32_t n_channels;               /* 0: the columns are muscles; the rest is 0 then */
     double rate;                      /* Hz */
     double offset, filter_delay, lag; /* s */
+    double peak;                      /* of its MVC, of the channel that reaches most; NaN: none */
+    int32_t peak_channel;
 } mhi_emg_report;
 
 /* The file data.emg on frames at time [n_frames], `step` s apart: emg [n_frames x n_muscles], at

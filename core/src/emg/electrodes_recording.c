@@ -156,8 +156,18 @@ mhe_status mhi_electrodes_read(const mhi_run *run, const mhe_description *model,
         for (int32_t i = 0; i < e->n_wires; i++) {
             *n_muscles_found += e->column[e->wires[i].channel] >= 0;
         }
-        *report = (mhi_emg_report){e->n_channels, table->rate, e->offset,
-                                   mhi_envelope_delay(e->envelope), e->lag};
+        *report = (mhi_emg_report){.n_channels = e->n_channels,
+                                   .rate = table->rate,
+                                   .offset = e->offset,
+                                   .filter_delay = mhi_envelope_delay(e->envelope),
+                                   .lag = e->lag,
+                                   .peak = NAN};
+        for (int32_t i = 0; i < e->n_channels; i++) {
+            if (!(e->peaks[i] <= report->peak) && !isnan(e->peaks[i])) {
+                report->peak = e->peaks[i];
+                report->peak_channel = i;
+            }
+        }
         status = mhi_electrodes_check_peaks(run, table->path, e->peaks, host, err);
     }
     mhi_electrodes_close(e);

@@ -35,6 +35,7 @@ typedef struct mhi_recording {
     double unit; /* metres per unit of the marker file */
     char unit_name[8];
     int32_t n_markers_found, n_emg_found;
+    int32_t n_emg_columns; /* of data.emg, where columns are muscles; else 0 */
     mhi_emg_report emg_report;
     char alignment[512]; /* rates and offsets of the sources in a line, where EMG was processed */
     mhi_reference reference;

@@ -68,6 +68,7 @@ static mhe_status read_muscles(mhi_recording *r, const mhi_run *run, const mhe_d
     for (int32_t k = 0; k < table->n_rows; k++) {
         table->time[k] += run->data.emg_offset;
     }
+    r->n_emg_columns = table->n_labels;
     const char **names = mhi_recording_names(d, 'm', d->n_muscles);
     mhe_status status = names == NULL ? mhe_fail(err, MHE_E_MEMORY, "out of memory")
                         : r->time == NULL

@@ -15,7 +15,9 @@
 #define TURNS 10.0         /* rad: no joint turns further */
 #define MOST_DEGREES 720.0 /* larger numbers say "without end" */
 #define ROUNDED 1e-6
-#define FAR 20.0 /* m */
+#define FAR 20.0    /* m */
+#define LONGEST 3.0 /* m of fibre or tendon: no animal has more (a giraffe's leg) */
+#define HEAVY 30.0  /* m/s2: no planet that people stand on */
 
 int32_t mhi_build_find_body(mhi_builder *b, const char *name, int32_t line, const char *what,
                             const char *whose) {
@@ -187,6 +189,26 @@ static void check_muscle(mhi_builder *b, const mhi_muscle_draft *draft) {
     }
 }
 
+/* Lengths that are some, but of no muscle. */
+static void warn_long(mhi_builder *b, const mhi_muscle_draft *draft) {
+    const mhe_muscle *m = &draft->muscle;
+    if (m->optimal_fiber_length > LONGEST || m->tendon_slack_length > LONGEST) {
+        mhi_build_warn(b, draft->line,
+                       "muscle '%s' has fibres of %g m and a tendon of %g m; are they in mm?",
+                       m->name, m->optimal_fiber_length, m->tendon_slack_length);
+    }
+}
+
+static void check_gravity(mhi_builder *b) {
+    const double g = hypot(hypot(b->gravity[0], b->gravity[1]), b->gravity[2]);
+    if (g > HEAVY || fabs(g - 1) < 0.1) {
+        mhi_build_warn(b, 0, "gravity is %g m/s2; is it in %s?", g,
+                       g < HEAVY         ? "parts of 9.81 m/s2"
+                       : g < 100 * HEAVY ? "cm/s2"
+                                         : "mm/s2");
+    }
+}
+
 void mhi_build_warn_degrees(mhi_builder *b, int32_t line, const char *whose,
                             const mhe_coordinate *coordinate, const double range[2]) {
     const double largest = fmax(fabs(range[0]), fabs(range[1]));
@@ -262,6 +284,8 @@ void mhi_build_check(mhi_builder *b) {
     }
     for (int32_t i = 0; i < b->muscles.n; i++) {
         check_muscle(b, MUSCLE(b, i));
+        warn_long(b, MUSCLE(b, i));
     }
+    check_gravity(b);
     check_places(b);
 }

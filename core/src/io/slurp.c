@@ -8,6 +8,7 @@
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 
 #define NAMES 64 /* of a folder that are near enough */
@@ -77,6 +78,26 @@ static mhe_status read_all(FILE *file, const char *path, char **text, size_t *le
                : MHE_OK;
 }
 
+static int32_t is_web_page(const char *text) {
+    text += strncmp(text, "\xef\xbb\xbf", 3) == 0 ? 3 : 0;
+    text += strspn(text, " \t\r\n");
+    return strncasecmp(text, "<!doctype html", 14) == 0 || strncasecmp(text, "<html", 5) == 0;
+}
+
+/* What stands in a file's place after a download that did not fetch it. */
+static mhe_status refuse_stand_in(const char *path, const char *text, mhe_error *err) {
+    static const char pointer[] = "version https://git-lfs.github.com/spec/";
+    return strncmp(text, pointer, sizeof pointer - 1) == 0
+               ? mhe_fail(err, MHE_E_INPUT,
+                          "%s:1: a pointer of Git LFS, not the file itself: 'git lfs pull' "
+                          "fetches it",
+                          path)
+           : is_web_page(text)
+               ? mhe_fail(err, MHE_E_INPUT,
+                          "%s:1: a web page, not the file itself: download the raw file", path)
+               : MHE_OK;
+}
+
 mhe_status mhi_slurp(const char *path, char **text, size_t *length, mhe_error *err) {
     *text = NULL;
     *length = 0;
@@ -89,6 +110,9 @@ mhe_status mhi_slurp(const char *path, char **text, size_t *length, mhe_error *e
                             ? mhe_fail(err, MHE_E_INPUT, "%s: is a folder; a file is needed", path)
                             : read_all(file, path, text, length, err);
     (void)fclose(file);
+    if (status == MHE_OK) {
+        status = refuse_stand_in(path, *text, err);
+    }
     if (status != MHE_OK) {
         free(*text);
         *text = NULL;
