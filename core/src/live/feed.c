@@ -132,6 +132,12 @@ mhe_status mhi_feed_begin(mhi_feed *f, mhe_error *err) {
 
 /* ---- electrodes: frames get their EMG when it is there ---- */
 
+/* Whether the sample nearest to a time has come. Streams of one clock are smoothed each by itself:
+ * what was sampled with the frame may lie a millionth of a second before it. */
+static int32_t has_come(const mhi_inlet *in, double host_time) {
+    return in->newest + (in->rate > 0 ? 0.5 / in->rate : 0) >= host_time;
+}
+
 static void keep_waiting(mhi_feed *f, double time) {
     if (f->n_waiting == WAITING) {
         f->first_waiting = (f->first_waiting + 1) % WAITING;
@@ -142,7 +148,7 @@ static void keep_waiting(mhi_feed *f, double time) {
 
 static mhe_status serve_waiting(mhi_feed *f, mhi_inlet *in, mhe_error *err) {
     mhe_status status = MHE_OK;
-    while (f->n_waiting > 0 && f->start + f->waiting[f->first_waiting] <= in->newest &&
+    while (f->n_waiting > 0 && has_come(in, f->start + f->waiting[f->first_waiting]) &&
            status == MHE_OK) {
         const double time = f->waiting[f->first_waiting];
         mhi_electrodes_at(in->electrodes, f->start + time, in->row);
@@ -158,7 +164,7 @@ static void add_electrodes(mhi_feed *f, double time) {
     for (int32_t i = 0; i < f->n_inlets; i++) {
         mhi_inlet *in = &f->inlets[i];
         if (in->is_raw && in->channel >= 0) {
-            if (in->newest >= f->start + time) {
+            if (has_come(in, f->start + time)) {
                 mhi_electrodes_at(in->electrodes, f->start + time, in->row);
                 f->channels[in->channel] = in->row;
             } else {
