@@ -122,7 +122,7 @@ same() {
 # answered NAME FOLDER: no optimum is the only one: all windows converge by default settings, to the same angles
 answered() {
     count=$((count + 1))
-    for solver in 'robust rti, preset: robust' 'speed rti' 'ipopt ipopt'; do
+    for solver in 'robust rti, preset: robust' 'speed rti, preset: speed' 'ipopt ipopt'; do
         by "$1" "$2" "${solver%% *}" "${solver#* }"
         settled "$1" "$2" "${solver%% *}"
     done
@@ -136,7 +136,7 @@ answered() {
 # told NAME FOLDER STATUS 'TEXT': all three end so, with this said
 told() {
     count=$((count + 1))
-    for solver in 'robust rti, preset: robust' 'speed rti' 'ipopt ipopt'; do
+    for solver in 'robust rti, preset: robust' 'speed rti, preset: speed' 'ipopt ipopt'; do
         by "$1" "$2" "${solver%% *}" "${solver#* }"
         status=$?
         [ $status -eq "$3" ] && grep -qF -- "$4" "$2/$1-${solver%% *}.txt" || fail "$1 $solver: status $status: $(cat "$2/$1-${solver%% *}.txt")"
