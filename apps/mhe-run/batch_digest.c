@@ -96,7 +96,8 @@ static char *field(FILE *file, const char *key, char *line, int size) {
 }
 
 int32_t batch_end_read(const batch *b, const batch_trial *t, batch_end *end) {
-    char path[4200], digest[64], status[64], seconds[64], message[sizeof end->message + 16];
+    char path[4200], digest[64], status[64], seconds[64],
+        message[sizeof end->message + sizeof "message"];
     FILE *file = path_of(b, t, "", path) ? fopen(path, "r") : NULL;
     *end = (batch_end){.digest = 0};
     if (file == NULL) {
