@@ -19,6 +19,21 @@ def drop_columns(path, to, names):
     write(to, "\n".join(lines[:head] + cut) + "\n")
 
 
+def change_emg(to, changes):
+    """B_emg.sto with a column's cells by what `changes` makes of them: {muscle: cell -> cell}."""
+    with open("B_emg.sto") as file:
+        lines = file.read().split("\n")
+    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
+    labels = [re.sub("^e_", "", label) for label in lines[head].split("\t")]
+    for i in range(head + 1, len(lines)):
+        cells = lines[i].split("\t")
+        if len(cells) == len(labels):
+            for name, change in changes.items():
+                cells[labels.index(name)] = change(cells[labels.index(name)])
+            lines[i] = "\t".join(cells)
+    write(to, "\n".join(lines))
+
+
 def test_told():
     """What the recordings say nothing about, and what they say against what was expected, is told by name."""
     for motion in "AB":
@@ -46,17 +61,7 @@ def test_told():
 
 def test_channels():
     """An electrode that was off and an MVC that was no maximum are told by the muscle's name; the calibration goes on."""
-    with open("B_emg.sto") as file:
-        lines = file.read().split("\n")
-    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
-    labels = [re.sub("^e_", "", label) for label in lines[head].split("\t")]
-    for i in range(head + 1, len(lines)):
-        cells = lines[i].split("\t")
-        if len(cells) == len(labels):
-            cells[labels.index("SubScap")] = "0.2"
-            cells[labels.index("BRD")] = "%.6g" % (8 * float(cells[labels.index("BRD")]))
-            lines[i] = "\t".join(cells)
-    write("B_odd.sto", "\n".join(lines))
+    change_emg("B_odd.sto", {"SubScap": lambda _: "0.2", "BRD": lambda value: "%.6g" % (8 * float(value))})
     write("odd.yaml", CONFIG.replace("B_emg", "B_odd"))
     done = run(CALIBRATE, "odd.yaml", "--out", "odd", "--set", "calibrate.max_iterations=1")
     assert done.returncode == 0, done.stderr
@@ -74,17 +79,7 @@ def test_channels():
 
 def test_doubts():
     """What is never there, hardly there, or wider than it may be, is told before anything is learned."""
-    with open("B_emg.sto") as file:
-        lines = file.read().split("\n")
-    head = next(i for i, line in enumerate(lines) if line.startswith("time"))
-    labels = [re.sub("^e_", "", label) for label in lines[head].split("\t")]
-    for i in range(head + 1, len(lines)):
-        cells = lines[i].split("\t")
-        if len(cells) == len(labels):
-            cells[labels.index("SubScap")] = "nan"
-            cells[labels.index("BRD")] = "%.6g" % (1e-3 * float(cells[labels.index("BRD")]))
-            lines[i] = "\t".join(cells)
-    write("B_faint.sto", "\n".join(lines))
+    change_emg("B_faint.sto", {"SubScap": lambda _: "nan", "BRD": lambda value: "%.6g" % (1e-3 * float(value))})
     with open("B/markers.trc") as file:
         lines = file.read().split("\n")
     head = next(i for i, line in enumerate(lines) if line.startswith("1\t"))
